@@ -13,7 +13,6 @@ from glotouch_bt.perception.touch import (
     Candidate,
     Contact,
     contour_quality,
-    infer_outline,
     signed_distance,
     split_at_motion,
 )
@@ -78,7 +77,7 @@ def admit(
     *,
     part_of: Candidate | None = None,
 ) -> Admitted:
-    """Add a trace to the map and to the candidates.
+    """Add a trace to the map and to the candidates; a contour that two bodies explain better becomes two candidates.
 
     The travelled path becomes free space and the outliers become hints. Without enough contacts for an outline, the
     position of the first contact is dropped. A trace at an existing candidate is merged with it and not counted again.
@@ -107,7 +106,7 @@ def admit(
         better = Candidate(len(known), outline.contour, height_m, quality(outline), traced.contacts, False)
     parts = bodies(better.contacts, radius, belief.path_K_m)
     every = {c.index: c for c in known} | {better.index: better}
-    changed = []
+    changed: list[int] = []
     for body in parts:
         index = len(every) if changed else better.index
         outline = outline_of(body, radius)
@@ -153,12 +152,14 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
     if len(every) < len(admitted.candidates) and part != len(every):
         every[part] = replace(every.pop(len(every)), index=part)
         changed = (*(i for i in changed if i != len(every)), part)
+        whole = part if whole == len(every) else whole
     return _admitted(belief, every, radius, whole, changed)
 
 
 def _admitted(
     belief: SearchMap, every: dict[int, Candidate], radius_m: float, index: int, changed: tuple[int, ...]
 ) -> Admitted:
+    """Return the result, with the pairs of candidates that are doubtful now."""
     candidates = tuple(every[i] for i in sorted(every))
     pairs = doubtful_pairs(candidates, radius_m, belief.path_K_m)
     return Admitted(belief.with_doubtful(count_doubtful(pairs)), candidates, index, changed, pairs)
@@ -203,8 +204,8 @@ def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Ca
             continue
         if _overlaps(old, first.point_K_m[None]):
             return old
-        one = _outline((*old.contacts, first), radius_m)
-        two = _outline(old.contacts, radius_m).log_evidence + _outline((first,), radius_m).log_evidence
+        one = outline_of((*old.contacts, first), radius_m)
+        two = outline_of(old.contacts, radius_m).log_evidence + outline_of((first,), radius_m).log_evidence
         if one.log_evidence > two + np.log(OTHER_OBJECT_ODDS) and max(one.contour.size_m) <= TraceParams().largest_m:
             return old
     return None
@@ -214,7 +215,7 @@ def joins(known: tuple[Candidate, ...], contacts: tuple[Contact, ...], radius_m:
     """Return True if the contacts of a trace under way belong to an existing candidate."""
     points = np.array([c.point_K_m for c in contacts])
     near = (old for old in known if _overlaps(old, points))
-    return any(max(_outline((*old.contacts, *contacts), radius_m).contour.size_m) <= MAX_LENGTH_M for old in near)
+    return any(max(outline_of((*old.contacts, *contacts), radius_m).contour.size_m) <= MAX_LENGTH_M for old in near)
 
 
 def of_another(belief: SearchMap, known: tuple[Candidate, ...], contact: Contact) -> bool:
@@ -237,15 +238,6 @@ def _is_fully_traced(candidate: Candidate) -> bool:
     return candidate.quality >= FULLY_TRACED_QUALITY and _is_well_traced(candidate)
 
 
-def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
-    return infer_outline(
-        _places(contacts, radius_m),
-        radius_m,
-        approach_K=np.array([c.approach_K[:2] for c in contacts]),
-        reaction_K=np.array([c.reaction_K[:2] for c in contacts]),
-    )
-
-
 def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: float) -> Candidate | None:
     """Return the union of candidate and trace, or None if they are two objects."""
     points = np.array([c.point_K_m for c in traced.contacts])
@@ -255,13 +247,13 @@ def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: flo
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
     everything = tuple(replace(c, pushed_K_m=np.zeros(2)) for c in (*before, *traced.contacts))
     contacts = split_at_motion(everything, radius_m, likely=len(old.contacts))[1]
-    outline = _outline(contacts, radius_m)
+    outline = outline_of(contacts, radius_m)
     if max(outline.contour.size_m) > MAX_LENGTH_M:
         middle = points.mean(axis=0)[None]
         if float(signed_distance(envelope(old), middle)[0]) > 0.0:
             return None
         # Only one object can be here: keep the newest contacts; some of the earlier ones were another object's.
-        contacts, outline = traced.contacts, _outline(traced.contacts, radius_m)
+        contacts, outline = traced.contacts, outline_of(traced.contacts, radius_m)
     return _with(replace(old, height_m=max(old.height_m, height_m)), contacts, outline)
 
 
@@ -292,8 +284,3 @@ def _apart_m(contacts: tuple[Contact, ...], points: Array) -> float:
     if np.linalg.svd(hull - hull.mean(axis=0))[1][1] > FLAT_M:
         return float(polygon_distance(convex_hull(hull), points).min())
     return float(np.linalg.norm(points[:, None] - hull[None], axis=2).min())
-
-
-def _places(contacts: tuple[Contact, ...], radius_m: float) -> Array:
-    """Return the points (k, 2) that outlines are fitted to: ball centres, or contact points for other sections."""
-    return np.array([c.tip_K_m[:2] if radius_m > 0 else c.point_K_m for c in contacts])

@@ -230,6 +230,7 @@ class SearchMap:
     def complete(self) -> bool:
         """True if all expected objects are traced; for an unknown number, if hardly anything can be left.
 
+        Doubtful objects do not count while one of the usual size could have been missed anywhere.
         A hint that is not followed yet is an object that is left.
         """
         if self.expected is not None:

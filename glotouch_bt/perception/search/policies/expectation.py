@@ -165,10 +165,11 @@ class ExpectedFind:
         tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
         if belief.expected is None:
             return self._everywhere.next_stretch(belief, tip)
-        for left in (belief.hidden, belief.anywhere):
-            if left.weight.sum() <= self.params.left:
+        for prior in (belief.prior, CROWDED):
+            weight = (belief.anywhere if prior is CROWDED else belief.hidden).weight
+            if weight.sum() <= self.params.left:
                 continue
-            node = self._first_node(belief, tip, left.weight, belief.prior if left is belief.hidden else CROWDED)
+            node = self._first_node(belief, tip, weight, prior)
             if node is not None:
                 if segment_is_free(belief, tip, node):
                     return Stretch(node[None, :])

@@ -85,11 +85,10 @@ def trace_more(
     s = TraceState.begin(_still(known), tip_K_m, tip_radius_m, round_tip, half_extent_m)
     s.known = s.given = len(known)
     s.columns = columns or s.columns
-    outline = s.outline()
-    bearings = all_bearings()
+    outline, bearings = s.outline(), all_bearings()
     distance, sd = s.ring(outline, bearings, p)
-    within = np.all(np.abs(_beside(outline, bearings, distance, sd, p)) <= s.half, axis=1)
-    for i in _apart(np.where(within, sd, -1.0), p.misses):
+    walled = np.any(np.abs(_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
+    for i in _apart(np.where(walled, -1.0, sd), p.misses):
         down, met = yield from _come_down(outline, s, p, float(bearings[i]))
         if not down:
             continue
