@@ -101,5 +101,7 @@ class GuardedSweep(Skill):
 
     def _blank_map(self) -> SearchMap:
         p = self.params
-        half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - p.wall_gap_m
-        return SearchMap.blank(half, None if p.expected_objects == "unknown" else p.expected_objects, p.left_below)
+        length, width = self.context.world.container.interior_m[:2]
+        half = 0.5 * np.array([length, width]) - p.wall_gap_m
+        expected = None if p.expected_objects == "unknown" else p.expected_objects
+        return SearchMap.blank(half, expected, p.left_below, (length, width))

@@ -2,22 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.perception.search import (
-    Move,
-    SearchMap,
-    SearchPlan,
-    admit,
-    joins,
-    left_in_words,
-    of_another,
-    part_of,
-    trace,
-)
+from glotouch_bt.perception.search import Move, SearchMap, SearchPlan, left_in_words, trace_bodies
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
@@ -50,7 +39,8 @@ class OrbitProbe(Skill):
 
     Make contacts where the outline is least certain for the distance, until the fit's covariance is small enough. Set
     aside a contact that cannot belong to the object. The defaults give a coarse outline, so that the next object is
-    found soon; `refine_outline` refines it once all are found.
+    found soon; `refine_outline` refines it once all are found. A contour that two bodies explain better than one gives
+    two candidates. Doubtful candidates are traced further before the search ends by count.
 
     SUCCESS: `candidates` has a new candidate, or a better outline of a partly traced one; the map excludes its
     envelope.
@@ -103,33 +93,31 @@ class OrbitProbe(Skill):
         explorer = Explorer(self.context, self.tool, p.speeds(), self.event)
         if float(np.linalg.norm(explorer.tip_K_m - first.tip_K_m[:2])) > NEAR_M:
             yield from explorer.run(_back_to(first, p.clearance_m))
-        radius = self.tool.tip_radius_m if self.tool.round else 0.0
-        old = part_of(known, first, radius)
-        plan = trace(
+        plan = trace_bodies(
+            belief,
+            known,
             first,
             explorer.tip_K_m,
             self.tool.tip_radius_m,
             p.rule(),
+            p.height_m,
+            p.exclusion_m,
             round_tip=self.tool.round,
-            half_extent_m=belief.half_extent_m,
-            known=() if old is None else old.contacts,
-            elsewhere=partial(of_another, known) if old is None else None,
-            joined=partial(joins, known, radius_m=radius) if old is None else None,
         )
-        traced = yield from explorer.run(plan)
-        admitted = admit(belief, known, first, traced, p.height_m, p.exclusion_m, part_of=old)
+        admitted, traced = yield from explorer.run(plan)
         self.map = admitted.belief
         if admitted.index is None:
             raise self.NOT_TRACED(
                 f"{len(traced.contacts)} contacts: no outline fits; {traced.ended}", contacts=len(traced.contacts)
             )
-        self.event(
-            "candidate",
-            candidate=admitted.candidates[admitted.index],
-            displaced_m=float(np.linalg.norm(traced.displaced_K_m)),
-            ended=traced.ended,
-            moves=traced.moves,
-        )
+        for index in admitted.changed:
+            self.event(
+                "candidate",
+                candidate=admitted.candidates[index],
+                displaced_m=float(np.linalg.norm(traced.displaced_K_m)),
+                ended=traced.ended,
+                moves=traced.moves,
+            )
         self.candidates = admitted.candidates
         self.found, self.complete = len(admitted.candidates), self.map.complete
         self.chance_left = self.map.chance_left

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from itertools import count
 from typing import Any
 
@@ -17,14 +17,10 @@ from glotouch_bt.perception.search import (
     MoveOutcome,
     SearchMap,
     SearchPolicy,
-    admit,
     elsewhere_m,
-    joins,
-    of_another,
-    part_of,
     refined,
     seek,
-    trace,
+    trace_bodies,
     trace_more,
 )
 from glotouch_bt.perception.touch import Candidate
@@ -107,7 +103,8 @@ def explore(
         left_below: With an unknown number, the chance that something is left below which it stops.
     """
     sweep, orbit = _defaults("guarded_sweep"), _defaults("orbit_probe")
-    belief = SearchMap.blank(world.half_m + world.tip_radius_m - sweep.wall_gap_m, expected, left_below)
+    half = world.half_m + world.tip_radius_m
+    belief = SearchMap.blank(half - sweep.wall_gap_m, expected, left_below, (2 * float(half[0]), 2 * float(half[1])))
     maps: list[SearchMap] = []
     found: dict[int, Traced] = {}
     candidates: tuple[Candidate, ...] = ()
@@ -121,25 +118,14 @@ def explore(
                 ended = "complete" if belief.complete else "exhausted"
                 break
             first, radius = sought.contact, world.tip_radius_m
-            old = part_of(candidates, first, radius)
-            known = () if old is None else old.contacts
-            elsewhere = partial(of_another, candidates) if old is None else None
-            joined = partial(joins, candidates, radius_m=radius) if old is None else None
-            plan = trace(
-                first,
-                world.tip_K_m,
-                radius,
-                orbit.rule(),
-                half_extent_m=belief.half_extent_m,
-                known=known,
-                elsewhere=elsewhere,
-                joined=joined,
+            plan = trace_bodies(
+                belief, candidates, first, world.tip_K_m, radius, orbit.rule(), orbit.height_m, orbit.exclusion_m
             )
-            traced = drive(plan, execute)
-            admitted = admit(belief, candidates, first, traced, orbit.height_m, orbit.exclusion_m, part_of=old)
+            admitted = drive(plan, execute)[0]
             belief, candidates = admitted.belief, admitted.candidates
-            if admitted.index is not None:
-                found[admitted.index] = Traced(world.travel_m, candidates[admitted.index])
+            for i in admitted.changed:
+                found[i] = Traced(world.travel_m, candidates[i])
+            found = {i: found[i] for i in range(len(candidates))}
     except _OutOfBudget:
         ended = "budget"
     return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, tuple(maps))

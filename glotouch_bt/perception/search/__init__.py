@@ -9,6 +9,7 @@ from glotouch_bt.perception.search.candidates import (
     part_of,
     refined,
 )
+from glotouch_bt.perception.search.exploring import trace_bodies
 from glotouch_bt.perception.search.map import LEFT_BELOW, SearchMap
 from glotouch_bt.perception.search.moves import Move, MoveKind, MoveOutcome, SearchPlan, T
 from glotouch_bt.perception.search.policies import (

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from glotouch_bt.perception.search.bodies import bodies, count_doubtful, doubtful_pairs, outline_of
 from glotouch_bt.perception.search.map import FACING, SearchMap
 from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams
 from glotouch_bt.perception.touch import (
     Candidate,
     Contact,
     contour_quality,
-    infer_outline,
     signed_distance,
     split_at_motion,
 )
@@ -56,11 +56,15 @@ class Admitted:
         belief: The map.
         candidates: All candidates.
         index: Index of the new or updated candidate; None if the trace gave none.
+        changed: Indices of all new or updated candidates, `index` first: one contour may be several bodies.
+        doubtful: Pairs of neighbours that may be one body.
     """
 
     belief: SearchMap
     candidates: tuple[Candidate, ...]
     index: int | None
+    changed: tuple[int, ...] = ()
+    doubtful: tuple[tuple[Candidate, Candidate], ...] = ()
 
 
 def admit(
@@ -73,7 +77,7 @@ def admit(
     *,
     part_of: Candidate | None = None,
 ) -> Admitted:
-    """Add a trace to the map and to the candidates.
+    """Add a trace to the map and to the candidates; a contour that two bodies explain better becomes two candidates.
 
     The travelled path becomes free space and the outliers become hints. Without enough contacts for an outline, the
     position of the first contact is dropped. A trace at an existing candidate is merged with it and not counted again.
@@ -87,21 +91,78 @@ def admit(
         exclusion_m: Margin around the object that the search avoids.
         part_of: Candidate whose contacts started the trace.
     """
-    belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *traced.outliers))
+    outliers = tuple(c for c in traced.outliers if not belief.at_wall(c))
+    belief = belief.with_path(traced.path_K_m).with_hints((*belief.hints, *outliers))
     if traced.outline is None or len(traced.contacts) < MIN_CONTACTS:
         return Admitted(belief.with_dropped(first.point_K_m), known, None)
     radius = traced.outline.touches.radius_m
     if part_of is not None and traced.continued:
-        better = _with(part_of, traced.contacts, traced.outline)
-        belief = belief.with_exclusion(envelope(better), exclusion_m, new=False)
-        return Admitted(belief, tuple(better if c.index == better.index else c for c in known), better.index)
-    for old in known:
-        more = _merged(old, traced, radius, height_m)
-        if more is not None:
-            belief = belief.with_exclusion(envelope(more), exclusion_m, new=False)
-            return Admitted(belief, tuple(more if c.index == old.index else c for c in known), old.index)
-    candidate = Candidate(len(known), traced.outline.contour, height_m, quality(traced.outline), traced.contacts, False)
-    return Admitted(belief.with_exclusion(envelope(candidate), exclusion_m), (*known, candidate), candidate.index)
+        better: Candidate | None = _with(part_of, traced.contacts, traced.outline)
+    else:
+        better = next((m for m in (_merged(old, traced, radius, height_m) for old in known) if m is not None), None)
+    counted = better is not None
+    if better is None:
+        outline = traced.outline
+        better = Candidate(len(known), outline.contour, height_m, quality(outline), traced.contacts, False)
+    parts = bodies(better.contacts, radius, belief.path_K_m)
+    every = {c.index: c for c in known} | {better.index: better}
+    changed: list[int] = []
+    for body in parts:
+        index = len(every) if changed else better.index
+        outline = outline_of(body, radius)
+        every[index] = replace(better, index=index)
+        if len(parts) > 1:
+            every[index] = _with(every[index], body, outline)
+        belief = belief.with_exclusion(envelope(every[index]), exclusion_m, new=bool(changed) or not counted)
+        changed.append(index)
+    return _admitted(belief, every, radius, better.index, tuple(changed))
+
+
+def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclusion_m: float) -> Admitted:
+    """Divide the contacts of two candidates anew after a further trace of the second one.
+
+    If one body explains all of them, the second candidate is dropped, and the last one receives its index.
+
+    Args:
+        admitted: Map and candidates.
+        whole, part: Indices of the two candidates.
+        more: The further trace.
+        exclusion_m: Margin around the objects that the search avoids.
+    """
+    outliers = tuple(c for c in more.outliers if not admitted.belief.at_wall(c))
+    belief = admitted.belief.with_path(more.path_K_m).with_hints((*admitted.belief.hints, *outliers))
+    if more.outline is None:
+        return replace(admitted, belief=belief)
+    one, other = admitted.candidates[whole], admitted.candidates[part]
+    radius = more.outline.touches.radius_m
+    parts = bodies((*one.contacts, *more.contacts), radius, belief.path_K_m)
+    every = {c.index: c for c in admitted.candidates}
+    changed = tuple(dict.fromkeys((*admitted.changed, whole, part)))
+    if len(parts) == 1:
+        belief, changed = belief.with_one_less(), tuple(i for i in changed if i != part)
+        del every[part]
+        parts = (split_at_motion(parts[0], radius, likely=len(one.contacts))[1],)
+    mine = {id(c) for c in one.contacts}
+    parts = tuple(sorted(parts, key=lambda body: -sum(id(c) in mine for c in body)))
+    indices = (whole, part, *range(len(admitted.candidates), len(admitted.candidates) + len(parts)))
+    for index, body in zip(indices, parts, strict=False):
+        every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius))
+        belief = belief.with_exclusion(envelope(every[index]), exclusion_m, new=index not in (whole, part))
+        changed = tuple(dict.fromkeys((*changed, index)))
+    if len(every) < len(admitted.candidates) and part != len(every):
+        every[part] = replace(every.pop(len(every)), index=part)
+        changed = (*(i for i in changed if i != len(every)), part)
+        whole = part if whole == len(every) else whole
+    return _admitted(belief, every, radius, whole, changed)
+
+
+def _admitted(
+    belief: SearchMap, every: dict[int, Candidate], radius_m: float, index: int, changed: tuple[int, ...]
+) -> Admitted:
+    """Return the result, with the pairs of candidates that are doubtful now."""
+    candidates = tuple(every[i] for i in sorted(every))
+    pairs = doubtful_pairs(candidates, radius_m, belief.path_K_m)
+    return Admitted(belief.with_doubtful(count_doubtful(pairs)), candidates, index, changed, pairs)
 
 
 def refined(before: Candidate, traced: OutlineTrace) -> Candidate | None:
@@ -143,8 +204,8 @@ def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Ca
             continue
         if _overlaps(old, first.point_K_m[None]):
             return old
-        one = _outline((*old.contacts, first), radius_m)
-        two = _outline(old.contacts, radius_m).log_evidence + _outline((first,), radius_m).log_evidence
+        one = outline_of((*old.contacts, first), radius_m)
+        two = outline_of(old.contacts, radius_m).log_evidence + outline_of((first,), radius_m).log_evidence
         if one.log_evidence > two + np.log(OTHER_OBJECT_ODDS) and max(one.contour.size_m) <= TraceParams().largest_m:
             return old
     return None
@@ -154,12 +215,12 @@ def joins(known: tuple[Candidate, ...], contacts: tuple[Contact, ...], radius_m:
     """Return True if the contacts of a trace under way belong to an existing candidate."""
     points = np.array([c.point_K_m for c in contacts])
     near = (old for old in known if _overlaps(old, points))
-    return any(max(_outline((*old.contacts, *contacts), radius_m).contour.size_m) <= MAX_LENGTH_M for old in near)
+    return any(max(outline_of((*old.contacts, *contacts), radius_m).contour.size_m) <= MAX_LENGTH_M for old in near)
 
 
-def of_another(known: tuple[Candidate, ...], contact: Contact) -> bool:
-    """Return True if a contact made during a trace belongs to another, well-traced candidate."""
-    return any(
+def of_another(belief: SearchMap, known: tuple[Candidate, ...], contact: Contact) -> bool:
+    """Return True if a contact made during a trace belongs to a wall or to another, well-traced candidate."""
+    return belief.at_wall(contact) or any(
         float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < ON_M and _is_well_traced(c) for c in known
     )
 
@@ -177,15 +238,6 @@ def _is_fully_traced(candidate: Candidate) -> bool:
     return candidate.quality >= FULLY_TRACED_QUALITY and _is_well_traced(candidate)
 
 
-def _outline(contacts: tuple[Contact, ...], radius_m: float) -> OutlineBelief:
-    return infer_outline(
-        _places(contacts, radius_m),
-        radius_m,
-        approach_K=np.array([c.approach_K[:2] for c in contacts]),
-        reaction_K=np.array([c.reaction_K[:2] for c in contacts]),
-    )
-
-
 def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: float) -> Candidate | None:
     """Return the union of candidate and trace, or None if they are two objects."""
     points = np.array([c.point_K_m for c in traced.contacts])
@@ -195,13 +247,13 @@ def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: flo
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
     everything = tuple(replace(c, pushed_K_m=np.zeros(2)) for c in (*before, *traced.contacts))
     contacts = split_at_motion(everything, radius_m, likely=len(old.contacts))[1]
-    outline = _outline(contacts, radius_m)
+    outline = outline_of(contacts, radius_m)
     if max(outline.contour.size_m) > MAX_LENGTH_M:
         middle = points.mean(axis=0)[None]
         if float(signed_distance(envelope(old), middle)[0]) > 0.0:
             return None
         # Only one object can be here: keep the newest contacts; some of the earlier ones were another object's.
-        contacts, outline = traced.contacts, _outline(traced.contacts, radius_m)
+        contacts, outline = traced.contacts, outline_of(traced.contacts, radius_m)
     return _with(replace(old, height_m=max(old.height_m, height_m)), contacts, outline)
 
 
@@ -232,8 +284,3 @@ def _apart_m(contacts: tuple[Contact, ...], points: Array) -> float:
     if np.linalg.svd(hull - hull.mean(axis=0))[1][1] > FLAT_M:
         return float(polygon_distance(convex_hull(hull), points).min())
     return float(np.linalg.norm(points[:, None] - hull[None], axis=2).min())
-
-
-def _places(contacts: tuple[Contact, ...], radius_m: float) -> Array:
-    """Return the points (k, 2) that outlines are fitted to: ball centres, or contact points for other sections."""
-    return np.array([c.tip_K_m[:2] if radius_m > 0 else c.point_K_m for c in contacts])

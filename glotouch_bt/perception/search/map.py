@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from glotouch_bt.perception.search.remaining import ANY, USUAL, DiscPrior, Remaining, chance_left, remaining
+from glotouch_bt.perception.search.remaining import ANY, CROWDED, USUAL, DiscPrior, Remaining, chance_left, remaining
 from glotouch_bt.perception.touch import Contact, Contour, signed_distance
 from glotouch_bt.robot import Array, ParamError, frozen_array
 
@@ -24,6 +24,12 @@ KNOWN_M = 0.005
 FACING = -0.4
 """Minimum cosine between the force on the ball and the direction from an object's centre to the contact for the contact
 to belong to the object."""
+DOUBT_LEFT = 0.05
+"""Probability that an object would have been missed below which a search ends with doubtful objects counted."""
+WALL_M = 0.003
+"""Maximum distance from a wall of a contact with it. Source: ours; no object is as thin."""
+WALL_COSINE = 0.9
+"""Minimum cosine between the force on the ball and the wall's normal for the contact to be with the wall."""
 LEFT_BELOW = 0.05
 """Default chance that something is left below which the search for an unknown number of objects is complete."""
 Mask = npt.NDArray[np.bool_]
@@ -58,6 +64,8 @@ class SearchMap:
         dropped: (m, 2) positions given up: unreachable frontiers, contacts without an object.
         hints: Contacts with other objects during a trace; the search visits them first.
         left_below: With an unknown number, the chance that something is left below which the search is complete.
+        interior_m: Length and width of the container's interior; None: its walls are unknown.
+        doubtful: Number of traced objects that may be parts of other ones.
     """
 
     half_extent_m: Array
@@ -68,9 +76,17 @@ class SearchMap:
     dropped: Array
     hints: tuple[Contact, ...] = ()
     left_below: float = LEFT_BELOW
+    interior_m: tuple[float, float] | None = None
+    doubtful: int = 0
 
     @classmethod
-    def blank(cls, half_extent_m: npt.ArrayLike, expected: int | None, left_below: float = LEFT_BELOW) -> SearchMap:
+    def blank(
+        cls,
+        half_extent_m: npt.ArrayLike,
+        expected: int | None,
+        left_below: float = LEFT_BELOW,
+        interior_m: tuple[float, float] | None = None,
+    ) -> SearchMap:
         """Return a map without any exploration.
 
         Raises:
@@ -85,7 +101,7 @@ class SearchMap:
             raise ParamError("left_below", left_below, "in [0, 1]")
         none = np.zeros((0, 2))
         none.setflags(write=False)
-        return cls(half, expected, 0, none, (), none, left_below=left_below)
+        return cls(half, expected, 0, none, (), none, left_below=left_below, interior_m=interior_m)
 
     def with_path(self, points_K_m: npt.ArrayLike) -> SearchMap:
         """Add an executed, connected path (n, 2 or 3), resampled to 2 mm."""
@@ -127,6 +143,14 @@ class SearchMap:
         disc = Contour("round", point, (2 * radius_m, 2 * radius_m), 0.0, 0.0, np.zeros(0))
         return replace(self, exclusions=(*self.exclusions, Exclusion(disc, 0.0, traced=False)))
 
+    def with_one_less(self) -> SearchMap:
+        """Count one traced object less: it is a part of another one."""
+        return replace(self, found=self.found - 1)
+
+    def with_doubtful(self, doubtful: int) -> SearchMap:
+        """Set the number of traced objects that may be parts of other ones."""
+        return replace(self, doubtful=doubtful)
+
     def with_hints(self, contacts: tuple[Contact, ...]) -> SearchMap:
         """Replace the hints."""
         return replace(self, hints=contacts)
@@ -152,6 +176,14 @@ class SearchMap:
             if e.traced and not facing and float(e.clearance(tip[None])[0]) < KNOWN_M:
                 return True
         return False
+
+    def at_wall(self, contact: Contact) -> bool:
+        """Return True if a contact is with a wall of the container: near it, and pushed back by it."""
+        if self.interior_m is None:
+            return False
+        beyond = np.abs(contact.point_K_m) > 0.5 * np.array(self.interior_m) - WALL_M
+        inwards = -np.sign(contact.point_K_m) * contact.reaction_K[:2]
+        return bool(np.any(beyond & (inwards > WALL_COSINE)))
 
     def inside_extent(self, points_K_m: Array) -> Mask:
         """Return (n,) True for points (n, 2) that the tip's centre may visit."""
@@ -181,6 +213,12 @@ class SearchMap:
         return remaining(self.half, self.prior, traced, self.path_distance, self.dropped)
 
     @cached_property
+    def anywhere(self) -> Remaining:
+        """Where objects of the usual sizes may still be, without a gap to walls and traced objects."""
+        traced = [e.contour for e in self.exclusions]
+        return remaining(self.half, CROWDED, traced, self.path_distance, self.dropped)
+
+    @cached_property
     def chance_left(self) -> float:
         """Probability that at least one object of the prior is left; nan with a known number."""
         if self.expected is not None:
@@ -192,10 +230,13 @@ class SearchMap:
     def complete(self) -> bool:
         """True if all expected objects are traced; for an unknown number, if hardly anything can be left.
 
+        Doubtful objects do not count while one of the usual size could have been missed anywhere.
         A hint that is not followed yet is an object that is left.
         """
         if self.expected is not None:
-            return self.found >= self.expected
+            if self.found < self.expected:
+                return False
+            return self.found - self.doubtful >= self.expected or self.anywhere.share < DOUBT_LEFT
         return not self.hints and self.chance_left < self.left_below
 
     @cached_property

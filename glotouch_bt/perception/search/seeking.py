@@ -68,7 +68,7 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
         if contact is not None:
             outcome = yield Move("retreat", tip - RETREAT_M * contact.approach_K[:2])
             return Sought(belief.with_path(outcome.path_K_m), contact, True)
-    while belief.expected is not None or not belief.complete:
+    while not belief.complete:
         stretch = policy.next_stretch(belief, tip)
         if stretch is not None and (cornered or not lowered) and not stretch.raised:
             stretch = None

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit, elsewhere_m, joins, part_of
-from glotouch_bt.perception.search.candidates import _outline, quality
+from glotouch_bt.perception.search.bodies import outline_of
+from glotouch_bt.perception.search.candidates import quality
 from glotouch_bt.perception.touch import Candidate, Contact
 
 R = 0.006
@@ -33,7 +34,7 @@ def half_a_box():
 @pytest.fixture
 def candidate():
     contacts = half_a_box()
-    return Candidate(0, _outline(contacts, R).contour, 0.018, 0.5, contacts)
+    return Candidate(0, outline_of(contacts, R).contour, 0.018, 0.5, contacts)
 
 
 def test_the_far_end_of_a_box_is_a_part_of_it(candidate):
@@ -50,7 +51,7 @@ def test_more_of_a_candidate_replaces_it_and_counts_nothing(candidate):
     belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
     last = contact(0.04, 0.0, 1, 0)
     contacts = (*candidate.contacts, last)
-    traced = OutlineTrace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)), continued=True)
+    traced = OutlineTrace(contacts, outline_of(contacts, R), np.zeros(2), np.zeros((0, 2)), continued=True)
     admitted = admit(belief, (candidate,), last, traced, 0.018, 0.01, part_of=candidate)
     assert (admitted.index, len(admitted.candidates), admitted.belief.found) == (0, 1, 1)
     np.testing.assert_allclose(admitted.candidates[0].contour.centre_K_m, [-0.005, 0.0], atol=1e-3)
@@ -59,7 +60,7 @@ def test_more_of_a_candidate_replaces_it_and_counts_nothing(candidate):
 
 def test_the_height_of_a_new_candidate_is_that_of_the_trace_and_its_top_is_unknown():
     contacts = half_a_box()
-    traced = OutlineTrace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)), continued=False)
+    traced = OutlineTrace(contacts, outline_of(contacts, R), np.zeros(2), np.zeros((0, 2)), continued=False)
     (new,) = admit(SearchMap.blank((0.2, 0.15), expected=2), (), contacts[0], traced, 0.018, 0.01).candidates
     assert (new.height_m, new.top_touched) == (0.018, False)
 
@@ -69,9 +70,9 @@ def test_what_stands_too_near_for_another_object_is_the_same(candidate):
     two = {}
     for gap in (0.016, 0.026):
         contacts = tuple(contact(0.01 + gap + dx, y, nx, ny) for dx, y, nx, ny in LIMB)
-        traced = OutlineTrace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
+        traced = OutlineTrace(contacts, outline_of(contacts, R), np.zeros(2), np.zeros((0, 2)))
         belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
-        near = dataclasses.replace(candidate, contour=_outline(candidate.contacts[:3], R).contour)
+        near = dataclasses.replace(candidate, contour=outline_of(candidate.contacts[:3], R).contour)
         two[gap] = len(admit(belief, (near,), contacts[0], traced, 0.018, 0.01).candidates)
     assert two == {0.016: 1, 0.026: 2}
 
@@ -86,7 +87,7 @@ def ring(x, y, radius, degrees):
 
 def disc_of_40_mm():
     contacts = ring(0.0, 0.0, 0.02, np.arange(0.0, 360.0, 45.0))
-    outline = _outline(contacts, R)
+    outline = outline_of(contacts, R)
     return Candidate(0, outline.contour, 0.018, quality(outline), contacts)
 
 
@@ -101,7 +102,7 @@ def disc_of_40_mm():
 )
 def test_what_lies_beside_an_outline_known_on_all_sides(contacts, objects):
     known = disc_of_40_mm()
-    traced = OutlineTrace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
+    traced = OutlineTrace(contacts, outline_of(contacts, R), np.zeros(2), np.zeros((0, 2)))
     belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(known.contour, 0.01)
     assert len(admit(belief, (known,), contacts[0], traced, 0.018, 0.01).candidates) == objects
 
@@ -109,8 +110,8 @@ def test_what_lies_beside_an_outline_known_on_all_sides(contacts, objects):
 @pytest.mark.parametrize("gap", [0.016, 0.026])
 def test_a_trace_turns_out_to_be_of_a_candidate_where_it_will_be_made_one_with_it(candidate, gap):
     contacts = tuple(contact(0.01 + gap + dx, y, nx, ny) for dx, y, nx, ny in LIMB)
-    near = dataclasses.replace(candidate, contour=_outline(candidate.contacts[:3], R).contour)
-    traced = OutlineTrace(contacts, _outline(contacts, R), np.zeros(2), np.zeros((0, 2)))
+    near = dataclasses.replace(candidate, contour=outline_of(candidate.contacts[:3], R).contour)
+    traced = OutlineTrace(contacts, outline_of(contacts, R), np.zeros(2), np.zeros((0, 2)))
     belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(candidate.contour, 0.01)
     one = len(admit(belief, (near,), contacts[0], traced, 0.018, 0.01).candidates) == 1
     assert joins((near,), contacts, R) == one == (gap == 0.016)
@@ -129,8 +130,8 @@ def test_the_end_of_something_long_is_less_known_than_a_disc():
         contact(-0.01, -0.022, 0, -1),
         contact(0.012, -0.022, 0, -1),
     )
-    assert quality(_outline(disc, R)) > 0.9
-    assert quality(_outline(end, R)) < 0.6
+    assert quality(outline_of(disc, R)) > 0.9
+    assert quality(outline_of(end, R)) < 0.6
 
 
 @pytest.mark.parametrize(("away_m", "lost"), [(0.0, False), (0.09, False), (0.11, True), (-0.11, True)])

@@ -121,3 +121,29 @@ def test_an_unknown_number_is_complete_when_hardly_anything_can_be_left():
     for left_below in (-0.1, 1.1, np.nan):
         with pytest.raises(ParamError, match="left_below"):
             SearchMap.blank((0.1, 0.1), None, left_below)
+
+
+@pytest.mark.parametrize(
+    ("point", "push", "wall"),
+    [
+        ((0.199, 0.0), (-1.0, 0.0), True),
+        ((0.0, -0.1495), (0.1, 0.99), True),
+        ((0.199, 0.0), (0.0, 1.0), False),  # the side of an object that touches the wall
+        ((0.190, 0.0), (-1.0, 0.0), False),  # an object in front of the wall
+    ],
+)
+def test_a_contact_is_with_a_wall_if_the_wall_is_there_and_pushes_back(point, push, wall):
+    reaction = np.array([*push, 0.0])
+    contact = Contact(0.0, np.zeros(3), -reaction, reaction, np.array(point), 1.0)
+    assert SearchMap.blank((0.188, 0.138), 2, interior_m=(0.4, 0.3)).at_wall(contact) is wall
+    assert not SearchMap.blank((0.188, 0.138), 2).at_wall(contact), "it knows no walls"
+
+
+def test_a_doubtful_object_counts_once_hardly_anything_can_have_been_missed():
+    found = SearchMap.blank((0.188, 0.138), expected=1).with_exclusion(DISC, 0.01)
+    assert found.complete
+    doubtful = found.with_doubtful(1)
+    assert not doubtful.complete
+    rows = np.arange(-0.138, 0.139, 0.012)
+    x = np.tile([-0.188, 0.188, 0.188, -0.188], len(rows))[: 2 * len(rows)]
+    assert doubtful.with_path(np.column_stack([x, np.repeat(rows, 2)])).complete

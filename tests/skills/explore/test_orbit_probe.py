@@ -74,7 +74,7 @@ def test_what_is_touched_by_the_way_becomes_a_hint(make, monkeypatch: pytest.Mon
         traced = yield from trace(*args, **keywords)
         return dataclasses.replace(traced, outliers=(stray,))
 
-    monkeypatch.setattr("glotouch_skills.explore.orbit_probe.trace", with_a_stray)
+    monkeypatch.setattr("glotouch_bt.perception.search.exploring.trace", with_a_stray)
     b, skill = make(belief=SearchMap.blank(np.array([0.138, 0.188]), expected=2).with_hints((old,)))
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message

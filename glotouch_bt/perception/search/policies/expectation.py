@@ -22,7 +22,7 @@ from glotouch_bt.perception.search.map import Exclusion, Mask, SearchMap
 from glotouch_bt.perception.search.policies.frontier import NearestFrontier
 from glotouch_bt.perception.search.policies.hidden import NearestHidden
 from glotouch_bt.perception.search.policies.policy import Stretch
-from glotouch_bt.perception.search.remaining import Discs
+from glotouch_bt.perception.search.remaining import Discs, Remaining
 from glotouch_bt.perception.search.routes import Routes, segment_is_free
 from glotouch_bt.robot import Array
 
@@ -181,9 +181,10 @@ class ExpectedFind:
         tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
         if belief.expected is None:
             return self._everywhere.next_stretch(belief, tip)
-        weight = belief.hidden.weight
-        if weight.sum() > self.params.left:
-            node = self._first_node(belief, tip, weight)
+        for hidden in (belief.hidden, belief.anywhere):
+            if hidden.weight.sum() <= self.params.left:
+                continue
+            node = self._first_node(belief, tip, hidden)
             if node is not None:
                 if segment_is_free(belief, tip, node):
                     return Stretch(node[None, :])
@@ -192,7 +193,7 @@ class ExpectedFind:
                     return Stretch(way)
         return self._rest.next_stretch(belief, tip)
 
-    def _first_node(self, belief: SearchMap, tip: Array, weight: Array) -> Array | None:
+    def _first_node(self, belief: SearchMap, tip: Array, hidden: Remaining) -> Array | None:
         """Return the end of the best path's first leg, or None if no path finds anything."""
         p = self.params
         lattice = _lattice(belief.half, p)
@@ -208,7 +209,7 @@ class ExpectedFind:
             return None
         goals, ahead_m = lattice.nodes[near], (p.depth - 1) * p.leg_m
         corners = np.concatenate([tip[None], goals - ahead_m, goals + ahead_m])
-        discs = _Hidden.of(belief.hidden.discs, weight, corners.min(axis=0), corners.max(axis=0))
+        discs = _Hidden.of(hidden.discs, hidden.weight, corners.min(axis=0), corners.max(axis=0))
         left = np.repeat(discs.weight[None], len(near), axis=0)
 
         def find(rows: Indices, start: Array, end: Array, *, take: bool = False) -> Array:

@@ -71,12 +71,13 @@ def trace_more(
     half_extent_m: Array | None = None,
     columns: Callable[[], Array] | None = None,
     anew: bool = False,
+    elsewhere: Callable[[Contact], bool] | None = None,
 ) -> SearchPlan[OutlineTrace]:
     """Continue the trace of an object from above: hop to where the outline is least certain.
 
     Args:
         known: Its contacts, at its current position.
-        tip_K_m, tip_radius_m, params, round_tip, half_extent_m: As for `trace`; the ball may be raised.
+        tip_K_m, tip_radius_m, params, round_tip, half_extent_m, elsewhere: As for `trace`; the ball may be raised.
         columns: Returns the places (n, 2) where the ball can come down through felt, free space.
         anew: The object moved since, or is another one: start again from what is met first.
     """
@@ -84,11 +85,10 @@ def trace_more(
     s = TraceState.begin(_still(known), tip_K_m, tip_radius_m, round_tip, half_extent_m)
     s.known = s.given = len(known)
     s.columns = columns or s.columns
-    outline = s.outline()
-    bearings = all_bearings()
+    outline, bearings = s.outline(), all_bearings()
     distance, sd = s.ring(outline, bearings, p)
-    within = np.all(np.abs(_beside(outline, bearings, distance, sd, p)) <= s.half, axis=1)
-    for i in _apart(np.where(within, sd, -1.0), p.misses):
+    walled = np.any(np.abs(_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
+    for i in _apart(np.where(walled, -1.0, sd), p.misses):
         down, met = yield from _come_down(outline, s, p, float(bearings[i]))
         if not down:
             continue
@@ -98,10 +98,10 @@ def trace_more(
             met = outcome.contact
         if met is not None and anew:
             return (yield from trace(met, s.tip, tip_radius_m, p, round_tip=round_tip, half_extent_m=half_extent_m))
-        if met is not None and s.belongs(outline, met, p):
+        if met is not None and not (elsewhere and elsewhere(met)) and s.belongs(outline, met, p):
             s.add(met, outline, p)
             yield from _retreat(s, p)
-            return (yield from _until_known(s, p))
+            return (yield from _until_known(s, p, elsewhere))
     return replace(s.trace(outline, "it was not met again"), missing=True)
 
 

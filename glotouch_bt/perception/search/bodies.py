@@ -1,0 +1,163 @@
+"""Number of bodies behind contacts: one outline, or two or more that touch, decided by evidence.
+
+Two convex bodies can be separated by a line, so every partition of the contacts by a line is a hypothesis. Its evidence
+is the product of the marginal likelihoods of an outline for each part. No gap between the bodies is assumed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glotouch_bt.perception.search.map import Mask
+from glotouch_bt.perception.search.tracing import TraceParams
+from glotouch_bt.perception.touch import Candidate, Contact, signed_distance
+from glotouch_bt.perception.touch.outline import OutlineBelief, envelope, infer_outline
+from glotouch_bt.robot import Array
+
+SEPARATE_NATS = 12.0
+"""Minimum gain of log evidence by which two bodies explain contacts better than one. Source: 54 of 77 contours of
+several objects gain more, and 15 of 408 of one (planar, seeds 700-759)."""
+WELL_NATS = 3.8
+"""Log evidence of a contact above which one outline explains the contacts well. Source: at most 3.5 on the 69
+contours of `SEPARATE_NATS`."""
+MIN_BODY_M = 0.015
+"""Minimum width of a body. A narrower part is a limb. Source: objects are at least 15 mm wide."""
+MIN_PART = 2
+"""Minimum number of contacts of a body."""
+CERTAIN_NATS = 60.0
+"""Minimum gain of log evidence above which two neighbouring candidates are two bodies beyond doubt. Source: the largest
+gain of a single object was 65 in the layouts of `SEPARATE_NATS`."""
+KNOWN_QUALITY = 0.3
+"""Minimum quality of a candidate beside another one that counts without doubt: the centre's standard deviation is below
+8 mm. Source: ours."""
+BESIDE_M = 0.020
+"""Maximum distance between outlines that may be one body."""
+MAX_NATS = 7.0
+"""Log evidence of a contact that a further outline is assumed to reach at most. Source: ours; the upper quartile is
+4.6."""
+DIRECTIONS = 12
+"""Number of directions in which contacts are divided."""
+NEAR_M = 0.06
+"""Maximum distance from the contacts of free positions that are evidence."""
+MOVED_M = 0.006
+"""Distance from a contact within which a free position is no evidence. Source: pushes of a few millimetres."""
+
+
+def outline_of(contacts: tuple[Contact, ...], radius_m: float, free_K_m: Array | None = None) -> OutlineBelief:
+    """Infer the outline of one body.
+
+    Args:
+        contacts: Its contacts, at its current position.
+        radius_m: Radius of the ball; 0 for another section, whose contact points are fitted.
+        free_K_m: (n, 2) positions of the ball without contact.
+    """
+    places = np.array([c.tip_K_m[:2] if radius_m > 0 else c.point_K_m for c in contacts])
+    if free_K_m is not None and len(free_K_m):
+        free_K_m = free_K_m[_distance(free_K_m, places) > MOVED_M]
+    return infer_outline(
+        places,
+        radius_m,
+        approach_K=np.array([c.approach_K[:2] for c in contacts]),
+        reaction_K=np.array([c.reaction_K[:2] for c in contacts]),
+        free_K_m=free_K_m,
+    )
+
+
+def bodies(
+    contacts: tuple[Contact, ...], radius_m: float, path_K_m: Array, gain: float = SEPARATE_NATS
+) -> tuple[tuple[Contact, ...], ...]:
+    """Return the contacts of each body, the body with most contacts first; one tuple if one body explains all.
+
+    Args:
+        contacts: All contacts, at the bodies' current positions.
+        radius_m: Radius of the ball; 0 for another section.
+        path_K_m: (n, 2) path of the ball without contact.
+        gain: Minimum gain of log evidence of a further body.
+    """
+    if len(contacts) < 2 * MIN_PART:
+        return (contacts,)
+    parts = _divided(contacts, radius_m, _near(path_K_m, contacts), gain)
+    return tuple(sorted(parts, key=len, reverse=True))
+
+
+def doubtful_pairs(
+    candidates: tuple[Candidate, ...], radius_m: float, path_K_m: Array
+) -> tuple[tuple[Candidate, Candidate], ...]:
+    """Return the pairs of neighbours that may be one body, or of which one is hardly known.
+
+    Two neighbours may be one body if one outline of a plausible size explains their contacts nearly as well as two, or
+    if the centre of one lies inside the other.
+    """
+    pairs = ((a, b) for i, b in enumerate(candidates) for a in candidates[:i])
+    return tuple((a, b) for a, b in pairs if _may_be_one(a, b, radius_m, path_K_m))
+
+
+def count_doubtful(pairs: tuple[tuple[Candidate, Candidate], ...]) -> int:
+    """Return the number of candidates that may be a part of another one: candidates less certain bodies."""
+    body = {c.index: c.index for pair in pairs for c in pair}
+    for a, b in pairs:
+        old, new = body[b.index], body[a.index]
+        body = {k: new if v == old else v for k, v in body.items()}
+    return len(body) - len(set(body.values()))
+
+
+def _may_be_one(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> bool:
+    """Return True if two candidates stand close and may be one body, or one of them is hardly known."""
+    if float(signed_distance(envelope(a), b.extent_K_m).min()) > BESIDE_M:
+        return False
+    if min(a.quality, b.quality) < KNOWN_QUALITY:
+        return True
+    over = (signed_distance(envelope(one), other.contour.centre_K_m[None])[0] for one, other in ((a, b), (b, a)))
+    return min(over) < 0.0 or gain_of_two(a, b, radius_m, path_K_m) < CERTAIN_NATS
+
+
+def gain_of_two(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> float:
+    """Return the gain of log evidence by two bodies over one; infinite if one would be larger than any object."""
+    both = (*a.contacts, *b.contacts)
+    free = _near(path_K_m, both)
+    one = outline_of(both, radius_m, free)
+    if max(one.contour.size_m) > TraceParams().largest_m:
+        return np.inf
+    return sum(outline_of(c.contacts, radius_m, free).log_evidence for c in (a, b)) - one.log_evidence
+
+
+def _near(path_K_m: Array, contacts: tuple[Contact, ...]) -> Array:
+    """Return the path positions (n, 2) that may be evidence about the body of these contacts."""
+    points = np.array([c.point_K_m for c in contacts])
+    return path_K_m[_distance(path_K_m, points) < NEAR_M] if len(path_K_m) else path_K_m
+
+
+def _divided(contacts: tuple[Contact, ...], radius_m: float, free: Array, gain: float) -> list[tuple[Contact, ...]]:
+    """Divide contacts in two while that gains evidence."""
+    limit = outline_of(contacts, radius_m, free).log_evidence + gain
+    if limit > WELL_NATS * len(contacts) + gain:
+        return [contacts]
+    best: list[tuple[Contact, ...]] = []
+    for part in _partitions(np.array([c.point_K_m for c in contacts])):
+        sides = [tuple(c for c, mine in zip(contacts, part == side, strict=True) if mine) for side in (True, False)]
+        outlines = [outline_of(sides[0], radius_m, free)]
+        if outlines[0].log_evidence + MAX_NATS * len(sides[1]) < limit:
+            continue
+        outlines.append(outline_of(sides[1], radius_m, free))
+        evidence = sum(o.log_evidence for o in outlines)
+        if evidence > limit and min(min(o.contour.size_m) for o in outlines) >= MIN_BODY_M:
+            limit, best = evidence, sides
+    return [body for side in best for body in _divided(side, radius_m, free, gain)] if best else [contacts]
+
+
+def _partitions(points: Array) -> list[Mask]:
+    """Return the distinct partitions (n,) of points (n, 2) by lines, with at least MIN_PART points on each side."""
+    found: dict[bytes, Mask] = {}
+    for angle in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:
+        order = np.argsort(points @ [np.cos(angle), np.sin(angle)], kind="stable")
+        for k in range(MIN_PART, len(points) - MIN_PART + 1):
+            part = np.zeros(len(points), dtype=np.bool_)
+            part[order[:k]] = True
+            part ^= not part[0]
+            found.setdefault(part.tobytes(), part)
+    return list(found.values())
+
+
+def _distance(points: Array, others: Array) -> Array:
+    """Return the distances (n,) of points (n, 2) from the nearest of others (m, 2)."""
+    return np.asarray(np.linalg.norm(points[:, None] - others[None], axis=2).min(axis=1))

@@ -1,0 +1,88 @@
+"""Exploration of one touched object: trace it, decide how many bodies it is, and check the doubtful ones."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from glotouch_bt.perception.search.candidates import Admitted, admit, joins, of_another, part_of, regroup
+from glotouch_bt.perception.search.map import SearchMap
+from glotouch_bt.perception.search.moves import SearchPlan
+from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams, trace, trace_more
+from glotouch_bt.perception.touch import Candidate, Contact
+from glotouch_bt.robot import Array
+
+CHECKED_CONTACTS = 12
+"""Number of contacts from which on a doubtful candidate is not traced further. Source: ours."""
+
+
+def trace_bodies(
+    belief: SearchMap,
+    known: tuple[Candidate, ...],
+    first: Contact,
+    tip_K_m: Array,
+    tip_radius_m: float,
+    params: TraceParams,
+    height_m: float,
+    exclusion_m: float,
+    *,
+    round_tip: bool = True,
+) -> SearchPlan[tuple[Admitted, OutlineTrace]]:
+    """Trace a touched object and add it to map and candidates.
+
+    A contour that two bodies explain better than one becomes two candidates. Doubtful candidates are traced further
+    before the search ends by count, and all their contacts are divided anew.
+
+    Args:
+        belief: Map before the trace.
+        known: Candidates before the trace.
+        first: Contact that started the trace.
+        tip_K_m, tip_radius_m, params, round_tip: As for `trace`.
+        height_m, exclusion_m: As for `admit`.
+    """
+    radius = tip_radius_m if round_tip else 0.0
+    old = part_of(known, first, radius)
+    traced = yield from trace(
+        first,
+        tip_K_m,
+        tip_radius_m,
+        params,
+        round_tip=round_tip,
+        half_extent_m=belief.half_extent_m,
+        known=() if old is None else old.contacts,
+        elsewhere=partial(of_another, belief, tuple(c for c in known if c is not old)),
+        joined=partial(joins, known, radius_m=radius) if old is None else None,
+    )
+    admitted = admit(belief, known, first, traced, height_m, exclusion_m, part_of=old)
+    checked: set[int] = set()
+    while (pair := _next_check(admitted, checked)) is not None:
+        whole, part = pair
+        checked |= {whole.index, part.index}
+        rest = tuple(c for c in admitted.candidates if c.index not in (whole.index, part.index))
+        more = yield from trace_more(
+            part.contacts,
+            tip_K_m,
+            tip_radius_m,
+            params,
+            round_tip=round_tip,
+            half_extent_m=belief.half_extent_m,
+            elsewhere=partial(of_another, belief, rest),
+        )
+        admitted = regroup(admitted, whole.index, part.index, more, exclusion_m)
+    return admitted, traced
+
+
+def _next_check(admitted: Admitted, checked: set[int]) -> tuple[Candidate, Candidate] | None:
+    """Return the next doubtful pair to check, the candidate to trace second; None: nothing needs a check now.
+
+    The parts of one contour are checked at once, all others before the search ends by count.
+    """
+    ends = admitted.belief.expected is not None and admitted.belief.found >= admitted.belief.expected
+    best: tuple[Candidate, Candidate] | None = None
+    for pair in admitted.doubtful:
+        indices = {c.index for c in pair}
+        if indices & checked or not (ends or indices <= set(admitted.changed)):
+            continue
+        whole, part = sorted(pair, key=lambda c: (-c.quality, c.index))
+        if len(part.contacts) < CHECKED_CONTACTS and (best is None or part.quality < best[1].quality):
+            best = whole, part
+    return best

@@ -1,0 +1,108 @@
+"""Contours of one body and of several: discs and boxes whose outlines are known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit
+from glotouch_bt.perception.search.bodies import bodies, count_doubtful, doubtful_pairs, outline_of
+from glotouch_bt.perception.search.candidates import quality, regroup
+from glotouch_bt.perception.touch import Candidate, Contact
+
+R = 0.006
+NO_PATH = np.zeros((0, 2))
+
+
+def contact(x: float, y: float, angle: float) -> Contact:
+    """A ball's contact with a surface through (x, y) whose outward normal has this angle."""
+    out = np.array([np.cos(angle), np.sin(angle), 0.0])
+    tip = np.array([x, y, 0.018]) + R * out
+    return Contact(0.0, tip, -out, out, tip[:2] - R * out[:2], 1.0)
+
+
+def disc(x: float, y: float, radius: float, degrees: tuple[float, ...]) -> tuple[Contact, ...]:
+    return tuple(contact(x + radius * np.cos(a), y + radius * np.sin(a), a) for a in np.deg2rad(degrees))
+
+
+def box(x: float, length: float, width: float) -> tuple[Contact, ...]:
+    """Nine contacts round a box: three on each long side, two on the end on the left and one on the right."""
+    along = [(x + t * length, side * 0.5 * width, side * np.pi / 2) for side in (1, -1) for t in (-0.35, 0.0, 0.35)]
+    ends = [(x - 0.5 * length, 0.3 * width, np.pi), (x - 0.5 * length, -0.3 * width, np.pi), (x + 0.5 * length, 0, 0)]
+    return tuple(contact(*c) for c in (*along, *ends))
+
+
+def candidate(index: int, contacts: tuple[Contact, ...]) -> Candidate:
+    outline = outline_of(contacts, R)
+    return Candidate(index, outline.contour, 0.018, quality(outline), contacts)
+
+
+LEFT = disc(-0.03, 0.0, 0.03, (60, 105, 150, 195, 240, 290))
+RIGHT = disc(0.02, 0.0, 0.02, (-80, -30, 10, 60, 110))
+
+
+@pytest.mark.parametrize("one", [LEFT, RIGHT, box(0.0, 0.1, 0.044)], ids=["disc", "small disc", "box"])
+def test_what_one_outline_explains_is_one_body(one: tuple[Contact, ...]) -> None:
+    assert bodies(one, R, NO_PATH) == (one,)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"), [(LEFT, RIGHT), (box(-0.05, 0.1, 0.044), disc(0.033, 0.0, 0.033, (-100, -50, 0, 50, 100)))]
+)
+def test_two_bodies_that_touch_are_told_apart_without_a_gap(
+    one: tuple[Contact, ...], other: tuple[Contact, ...]
+) -> None:
+    found = bodies((*one, *other), R, NO_PATH)
+    assert {frozenset(id(c) for c in part) for part in found} == {
+        frozenset(id(c) for c in part) for part in (one, other)
+    }
+
+
+def test_too_few_contacts_are_one_body() -> None:
+    assert bodies(LEFT[:3], R, NO_PATH) == (LEFT[:3],)
+
+
+def test_a_contour_of_two_bodies_becomes_two_candidates_that_count() -> None:
+    contacts = (*LEFT, *RIGHT)
+    traced = OutlineTrace(contacts, outline_of(contacts, R), np.zeros(2), NO_PATH)
+    admitted = admit(SearchMap.blank((0.2, 0.15), expected=2), (), contacts[0], traced, 0.018, 0.01)
+    assert (admitted.changed, admitted.belief.found) == ((0, 1), 2)
+    centres = [c.contour.centre_K_m for c in admitted.candidates]
+    np.testing.assert_allclose(centres, [[-0.03, 0.0], [0.02, 0.0]], atol=3e-3)
+
+
+def test_parts_of_one_body_are_doubtful_and_bodies_far_apart_are_not() -> None:
+    halves = candidate(0, LEFT[:3]), candidate(1, LEFT[3:])
+    far = candidate(2, disc(0.1, 0.1, 0.03, (0, 60, 120, 180, 240, 300)))
+    pairs = doubtful_pairs((*halves, far), R, NO_PATH)
+    assert [(a.index, b.index) for a, b in pairs] == [(0, 1)]
+    assert count_doubtful(pairs) == 1
+
+
+def test_candidates_are_counted_once_in_a_chain_of_doubtful_pairs() -> None:
+    a, b, c, d = (candidate(i, LEFT) for i in range(4))
+    assert count_doubtful(()) == 0
+    assert count_doubtful(((a, b), (b, c), (a, c))) == 2
+    assert count_doubtful(((a, b), (c, d))) == 2
+
+
+def test_parts_that_turn_out_to_be_one_body_are_one_candidate() -> None:
+    """The last candidate receives the index that becomes free."""
+    far = candidate(2, disc(0.1, 0.1, 0.03, (0, 60, 120, 180, 240, 300)))
+    parts = candidate(0, LEFT[:3]), candidate(1, LEFT[3:5])
+    belief = SearchMap.blank((0.2, 0.15), expected=3)
+    for c in (*parts, far):
+        belief = belief.with_exclusion(c.contour, 0.01)
+    first = admit_nothing(belief, (*parts, far))
+    traced = OutlineTrace(LEFT[3:], outline_of(LEFT[3:], R), np.zeros(2), NO_PATH)
+    after = regroup(first, 0, 1, traced, 0.01)
+    assert [c.index for c in after.candidates] == [0, 1]
+    assert after.belief.found == 2
+    assert after.candidates[0].contour.size_m == pytest.approx((0.06, 0.06), abs=2e-3)
+    assert after.candidates[1].contour is far.contour
+
+
+def admit_nothing(belief: SearchMap, candidates: tuple[Candidate, ...]):
+    """The state after a trace that gave nothing."""
+    nothing = OutlineTrace((), None, np.zeros(2), NO_PATH)
+    return admit(belief, candidates, LEFT[0], nothing, 0.018, 0.01)
