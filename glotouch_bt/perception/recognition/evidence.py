@@ -15,8 +15,8 @@ from glotouch_bt.robot import Array
 MIN_AREA_M2 = 6e-6
 """Minimum area of a connected contact patch."""
 EXTENT_RATIO = 0.5
-"""Depth over the threshold of contact down to which a patch extends (hysteresis threshold: J. Canny, 1986). Its peak
-exceeds the threshold. Source: ours."""
+"""Depth over the threshold of contact down to which a patch extends, but not into the noise (hysteresis threshold:
+J. Canny, 1986). Its peak exceeds the threshold. Source: ours."""
 ONE_SIDED = 0.35
 """Weight of a layer with one pad in contact, relative to 1 for both."""
 
@@ -131,7 +131,8 @@ def contact_tops(maps_m: list[Array], noise_m: list[float], pad: PadSpec) -> lis
         smooth = scipy.ndimage.median_filter(filled, size=(1, 3, 3), mode="nearest")
         flat = np.zeros((3, 3, 3))
         flat[1] = [[0, 1, 0], [1, 1, 1], [0, 1, 0]]
-        labels, n = scipy.ndimage.label((smooth > EXTENT_RATIO * threshold_m) & alive[:, None, None], structure=flat)
+        extent_m = np.maximum(EXTENT_RATIO * threshold_m, np.array([noise_m[i] for i in where])[:, None, None])
+        labels, n = scipy.ndimage.label((smooth > extent_m) & alive[:, None, None], structure=flat)
         if n == 0:
             continue
         count = np.bincount(labels.ravel(), minlength=n + 1)

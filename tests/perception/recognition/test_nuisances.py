@@ -128,3 +128,12 @@ def test_a_small_contact_is_found_in_smooth_noise() -> None:
     assert np.mean(found > 0) > 0.9  # 0.69 if the whole patch had to exceed the threshold
     assert float(np.median(found)) == pytest.approx(6e-4, abs=1.5e-4)
     assert np.mean(np.array(contact_tops(noise, [1e-4] * len(noise), spec)) > 0) < 0.08
+
+
+def test_a_large_shallow_patch_of_noise_is_not_taken_for_the_contact() -> None:
+    """A deep contact whose mean is above the noise: what is shallower than the noise is none of its patch."""
+    depth = np.zeros((35, 20))
+    depth[2:12, 2:12] = 1e-3
+    depth[16:, :] = 3.5e-5
+    depth[20, 5:9] = depth[21, 5:9] = depth[22, 5:9] = 6e-5
+    assert contact_tops([depth], [4.4e-5], PadSpec()) == pytest.approx([1e-3])
