@@ -2,7 +2,6 @@
 
 from glotouch_bt.motion.arm import Arm
 from glotouch_bt.motion.clearance import Scene
-from glotouch_bt.motion.felt_space import FREE_M_S, FeltSpace
 from glotouch_bt.motion.hand_pose import hand_pose_B, yaw_near_home
 from glotouch_bt.motion.jaws import JawRestDetector
 from glotouch_bt.motion.kinematics import Kinematics
@@ -11,5 +10,6 @@ from glotouch_bt.motion.pause_signal import PauseSignal, Style
 from glotouch_bt.motion.plan import MotionPlan, plan_piece
 from glotouch_bt.motion.shapes import finger_outline_half_m
 from glotouch_bt.motion.timing import Paces, ProfileLimits, rest_to_rest
+from glotouch_bt.motion.tool_memory import FREE_M_S, FeltSpace
 from glotouch_bt.motion.travel import Motion, MoveResult, drive
 from glotouch_bt.motion.workspace import out_of_reach

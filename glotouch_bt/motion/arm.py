@@ -16,13 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from glotouch_bt.motion.clearance import Scene
-from glotouch_bt.motion.felt_space import FeltSpace
 from glotouch_bt.motion.jaws import JawRestDetector
 from glotouch_bt.motion.joints import plan_joints
 from glotouch_bt.motion.paths import Arc, Line, Path, Polyline
 from glotouch_bt.motion.plan import plan_piece
 from glotouch_bt.motion.timing import JointProfile, Paces, ProfileLimits
-from glotouch_bt.motion.tool_seat import ToolSeat
+from glotouch_bt.motion.tool_memory import FeltSpace, ToolSeat
 from glotouch_bt.motion.travel import Guard, Motion, Mover, MoveResult
 from glotouch_bt.robot import (
     Array,

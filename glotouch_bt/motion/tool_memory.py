@@ -1,4 +1,4 @@
-"""Space in the container that the held tool has felt to be free.
+"""What the arm remembers of the held tool: the space that it felt to be free, and its displacement in the hand.
 
 The tool hangs straight down: its shaft stands above its ball. So where the ball passed without a contact, the column
 above is free at every height, except for what reaches in between the radii of shaft and ball. Objects are pushed by
@@ -24,6 +24,9 @@ CLEAR_OF_TOUCH_M = 0.015
 long. Source: `TraceParams.farthest_m`."""
 HANDLED_M = 0.10
 """Distance from closing jaws within which an object may have been moved. Source: ours."""
+MAX_DISPLACEMENT_M = 0.0015
+"""Largest displacement to correct. Source: ours; the overlap of the simulated holder's rails with the handle. Beyond
+it, the handle has left its rails and is tilted."""
 
 
 class FeltSpace:
@@ -92,3 +95,46 @@ class FeltSpace:
         self._free_K_m = np.array(state["free_K_m"], dtype=np.float64).reshape(-1, 3)
         self._hand_K_m = np.array(state["hand_K_m"], dtype=np.float64).reshape(-1, 3)
         self._touched_K_m = np.array(state["touched_K_m"], dtype=np.float64).reshape(-1, 2)
+
+
+class ToolSeat:
+    """Record of the tool's tip in the hand.
+
+    A tool slides a little in the jaws with every use. Put back at the hand's nominal place, it stands beside its own,
+    and after some rounds it is no longer on its rails. The first measurement shows how the tool is made, later ones how
+    it was displaced.
+    """
+
+    def __init__(self) -> None:
+        self._first_B_m: Array | None = None
+        self._now_B_m: Array | None = None
+
+    def measured(self, tip_B_m: Array) -> None:
+        """Record the horizontal offset (2,) in B of the tool's tip from P, with the hand as it took the tool."""
+        self._now_B_m = np.array(tip_B_m, dtype=np.float64)
+        if self._first_B_m is None:
+            self._first_B_m = self._now_B_m
+
+    def released(self) -> None:
+        """Forget the last measurement: the tool is no longer in the hand."""
+        self._now_B_m = None
+
+    @property
+    def displacement_B_m(self) -> Array:
+        """(3,) horizontal displacement of the tool in the hand since the first measurement, at most
+        `MAX_DISPLACEMENT_M`; zero if it is not known."""
+        if self._now_B_m is None or self._first_B_m is None:
+            return np.zeros(3)
+        moved = self._now_B_m - self._first_B_m
+        length = float(np.linalg.norm(moved))
+        return np.array([*(moved * min(1.0, MAX_DISPLACEMENT_M / max(length, 1e-12))), 0.0])
+
+    def state(self) -> dict[str, Any]:
+        """Return the record, for `restore`."""
+        return {"first_B_m": self._first_B_m, "now_B_m": self._now_B_m}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Restore a `state`."""
+        known = (state["first_B_m"], state["now_B_m"])
+        first, now = (None if v is None else np.array(v, dtype=np.float64).reshape(2) for v in known)
+        self._first_B_m, self._now_B_m = first, now

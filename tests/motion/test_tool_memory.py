@@ -1,10 +1,10 @@
-"""Space that the held tool has felt to be free."""
+"""What the arm remembers of the held tool: space that it felt to be free, and its displacement in the hand."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.motion.felt_space import CLEAR_OF_TOUCH_M, STEP_M, FeltSpace
+from glotouch_bt.motion.tool_memory import CLEAR_OF_TOUCH_M, MAX_DISPLACEMENT_M, STEP_M, FeltSpace, ToolSeat
 
 LOW, HIGH = 0.018, 0.13
 
@@ -67,3 +67,44 @@ def test_what_the_jaws_handled_is_forgotten() -> None:
     assert felt.free_down_to(np.array([[0.05, 0.0]]), 0.005) == np.inf
     assert felt.free_down_to(np.array([[0.05, 0.02]]), 0.005) == np.inf
     assert felt.free_down_to(np.array([[0.25, 0.0]]), 0.005) == 0.0
+
+
+def test_the_first_measurement_is_no_displacement() -> None:
+    seat = ToolSeat()
+    np.testing.assert_array_equal(seat.displacement_B_m, np.zeros(3))
+    seat.measured(np.array([4e-4, -1e-3]))
+    np.testing.assert_array_equal(seat.displacement_B_m, np.zeros(3))
+
+
+def test_later_measurements_are_compared_with_the_first() -> None:
+    seat = ToolSeat()
+    for tip in ([4e-4, -1e-3], [1e-4, -1e-3], [2e-4, -5e-4]):
+        seat.measured(np.array(tip))
+    np.testing.assert_allclose(seat.displacement_B_m, [-2e-4, 5e-4, 0.0])
+
+
+def test_a_large_displacement_is_cut_in_its_direction() -> None:
+    seat = ToolSeat()
+    seat.measured(np.zeros(2))
+    seat.measured(np.array([-0.006, 0.008]))
+    np.testing.assert_allclose(seat.displacement_B_m, [-0.6 * MAX_DISPLACEMENT_M, 0.8 * MAX_DISPLACEMENT_M, 0.0])
+
+
+def test_a_released_tool_has_no_displacement_until_it_is_measured_again() -> None:
+    seat = ToolSeat()
+    seat.measured(np.zeros(2))
+    seat.measured(np.array([5e-4, 0.0]))
+    seat.released()
+    np.testing.assert_array_equal(seat.displacement_B_m, np.zeros(3))
+    seat.measured(np.array([5e-4, 0.0]))
+    np.testing.assert_allclose(seat.displacement_B_m, [5e-4, 0.0, 0.0])
+
+
+def test_the_state_is_restored() -> None:
+    seat, other = ToolSeat(), ToolSeat()
+    seat.measured(np.zeros(2))
+    seat.measured(np.array([5e-4, 1e-4]))
+    other.restore(seat.state())
+    np.testing.assert_array_equal(other.displacement_B_m, seat.displacement_B_m)
+    other.restore(ToolSeat().state())
+    np.testing.assert_array_equal(other.displacement_B_m, np.zeros(3))
