@@ -134,7 +134,7 @@ class ClearPlanner:
 
         Args:
             moving: The object.
-            target: The object beside which the fingers need space, if there is one.
+            target: The object beside which the fingers need space; None: the object only has to leave its place.
         """
         others = [Neighbour.of(c) for c in self.candidates if c.index != moving.index]
         grasp = outline_grasp(moving, others, self.half_extent_m, self.gripper)
@@ -144,7 +144,7 @@ class ClearPlanner:
         at = Stance(grasp.position_K_m[:2], grasp.yaw_rad, grasp.opening_m)
         for gap in GAPS_M:
             places: list[Place] = []
-            for found in self._places(moving, at, gap, others):
+            for found in self._places(moving, at, gap, others, leave=target is None):
                 if isinstance(found, Place):
                     places.append(found)
                 yield None
@@ -164,7 +164,7 @@ class ClearPlanner:
         return self._space(target, [*(n for n in others if n.index != target.index), there])
 
     def _places(
-        self, moving: Candidate, at: Stance, gap: float, others: list[Neighbour]
+        self, moving: Candidate, at: Stance, gap: float, others: list[Neighbour], leave: bool
     ) -> Iterator[Place | None]:  # fmt: skip
         """Yield free places, nearest first and `PLACES_APART_M` apart, and None now and then."""
         own, centre = Neighbour.of(moving), moving.contour.centre_K_m
@@ -177,6 +177,8 @@ class ClearPlanner:
             for k in range(0, len(centres), PLACES_AT_ONCE):
                 some = centres[k : k + PLACES_AT_ONCE] - centre
                 free = free_gap_m(turned, some, standing, self.half_extent_m) >= gap
+                if leave:
+                    free &= free_gap_m(turned, some, [own], self.half_extent_m) >= 0.0
                 rated += [(float(np.linalg.norm(shift)), turn, shift) for shift in some[free]]
                 yield None
         chosen: list[Place] = []
