@@ -28,7 +28,7 @@ from glotouch_skills.common.planning.squeeze_plan import Stance
 
 GRID_M = 0.008
 """Spacing of the places to try. Source: ours; a place is at most 6 mm farther than the nearest free one."""
-TURNS_RAD = tuple(np.deg2rad([0.0, 90.0, -90.0, 45.0, -45.0]))
+TURNS_RAD = tuple(math.radians(turn) for turn in (0.0, 90.0, -90.0, 45.0, -45.0))
 """Turns of the object to try; all are considered before the nearest place is chosen."""
 GAPS_M = (0.028, 0.020, 0.012)
 """Gaps to keep from other objects and walls, widest first. The widest is a finger (14 mm), its gap to the object
