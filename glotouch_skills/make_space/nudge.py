@@ -58,9 +58,9 @@ class Nudge(Skill):
     """Push one object along the floor: a stated way, or the shortest way that makes space for the fingers.
 
     The flat side of the closed fingers pushes through the object's centre, low and slowly. The object slides with them,
-    so its touched edge is where they stop. Its position across the push, and the positions of what it passed closely,
-    become less certain. The space is made for the first object of `cramped`; the pushed object may be a neighbour of
-    it. With a stated distance, that object itself is pushed.
+    so its touched edge is where they stop. A push that would topple it ends. Its position across the push, and the
+    positions of what it passed closely, become less certain. The space is made for the first object of `cramped`; the
+    pushed object may be a neighbour of it. With a stated distance, that object itself is pushed.
 
     SUCCESS: it was pushed all the way; `candidates` has its new position, and its touches are given up.
     """
@@ -82,6 +82,16 @@ class Nudge(Skill):
         "blocked",
         "the object stopped against something; `candidates` has its position there",
         advice="push in another direction",
+    )
+    TIPPING = Failure(
+        "tipping",
+        "the object was about to topple and was pushed no farther; `candidates` has its position there",
+        advice="push in another direction, or lift it out with `clear_plan`, `grasp`, `lift` and `set_down`",
+    )
+    LEFT = Failure(
+        "left",
+        "the object left the fingers before they stopped: it rolled or toppled, and is not where it was traced",
+        advice="trace it again",
     )
     NOTHING_PUSHED = Failure(
         "nothing_pushed",
@@ -129,12 +139,21 @@ class Nudge(Skill):
                 f"candidate {moving.index} was not met: {felt.resistance_N:.2f} N along {felt.pushed_m * 1e3:.0f} mm",
                 resistance_N=felt.resistance_N,
             )
+        if felt.left:
+            self._doubt(moving.index)
+            self._tell(push, felt, "left")
+            raise self.LEFT(f"candidate {moving.index} was no longer felt before the end of the push")
         moved = after_push(moving, push, felt.edge_m, self._half_m[1], felt.pushed_m)
         shift_m = float((moved.contour.centre_K_m - moving.contour.centre_K_m) @ push.along_K)
         self.candidates = tuple(moved if c.index == moved.index else c for c in self.known)
         self._doubt(*push.near)
         self.event("candidate", candidate=moved, moved_m=shift_m, ended="pushed")
-        self._tell(push, felt, "stopped" if felt.stopped else "pushed")
+        self._tell(push, felt, "tipping" if felt.tipping else "stopped" if felt.stopped else "pushed")
+        if felt.tipping:
+            raise self.TIPPING(
+                f"candidate {moving.index} was about to topple after {felt.pushed_m * 1e3:.0f} mm of "
+                f"{push.distance_m * 1e3:.0f}"
+            )
         if felt.stopped:
             raise self.BLOCKED(
                 f"candidate {moving.index} resisted with {felt.peak_N:.1f} N after {felt.pushed_m * 1e3:.0f} mm of "

@@ -15,6 +15,7 @@ from glotouch_skills.common.hand import (
     CLEARANCE_M,
     MIN_GRIP_M,
     RELEASE_HEIGHT_M,
+    glide,
     keeping_clear_of,
     let_jaws_rest,
     lower,
@@ -30,6 +31,13 @@ OPEN_BY_M = 0.02
 MAX_FOLLOWED_M = 0.05
 """A hand that is farther than this from the planned grasp has moved since it lifted the object. The closing jaws follow
 an object by half of their opening (43 mm) at most."""
+PRESS_N = 5.0
+"""Force that an object touching the floor too early is pressed down with: one that hangs askew turns upright between
+the pads. The hard limit is 30 N."""
+PRESS_SPEED_RATIO = 0.5
+"""Speed of pressing over that of setting down: the arm is stiff."""
+ASKEW_M = 0.004
+"""An object that is released higher than this above its place hung askew and may have fallen. Source: ours."""
 NEAR_M = 0.006
 """Objects nearer than this to the carried one, before or after, may have been moved: it slides as the jaws close, and
 the outlines have errors. Source: ours."""
@@ -48,6 +56,10 @@ class SetDownParams(SkillParams):
     drop_m: float = param(
         "Largest height above the place at which it may be released", unit="m", default=0.015, ge=0.0, le=0.05
     )
+    press_m: float = param(
+        "Largest height above the place from which an object that touches is pressed down, to stand upright", unit="m",
+        default=0.025, ge=0.0, le=0.05,
+    )  # fmt: skip
     min_aperture_m: float = param("Minimum aperture of jaws that hold something", unit="m", default=MIN_GRIP_M, ge=0.0)
 
 
@@ -130,6 +142,9 @@ class SetDown(Skill):
             over = Pose(np.array([*low.position_m[:2], float(arm.pose_B_P.position_m[2])]), low.quat)
             yield from arm.transit(over, float(over.position_m[2]), p.speed_m_s, what="carry")
             reached, above_m = yield from lower(self.context, low, p.approach_speed_m_s, p.lower_speed_m_s)
+            if not reached and above_m <= p.press_m:
+                yield from glide(self.context, low, PRESS_SPEED_RATIO * p.lower_speed_m_s, bump_N=PRESS_N)
+                above_m = float(arm.pose_B_P.position_m[2] - low.position_m[2])
         if not reached and above_m > p.drop_m:
             yield from rise_clear(arm, p.speed_m_s)
             raise self.IN_THE_WAY(
@@ -200,6 +215,8 @@ class SetDown(Skill):
         stands = [Neighbour.of(moving), Neighbour.of(moved)]
         others = [Neighbour.of(c) for c in self.known if c.index != moving.index]
         self._doubt(*(n.index for n in others if min(gap_m(s, n) for s in stands) < NEAR_M))
+        if above_m > ASKEW_M:
+            self._doubt(moving.index)
         self.cramped = ()
         start, end = moving.contour.centre_K_m, moved.contour.centre_K_m
         turn_deg = float(np.rad2deg(place.turn_rad))

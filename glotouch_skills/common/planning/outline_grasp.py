@@ -1,6 +1,6 @@
 """Grasps of an object of which only outline and height are known.
 
-Planar, in K. The outline is that of the sensing height. The jaws close across its narrow side, at a low to middle
+Planar, in K. The outline is that of the sensing height. The jaws close across its narrow side, at middle
 height, and the open fingers keep clear of neighbours and walls.
 """
 
@@ -26,8 +26,9 @@ ALONG_M = (0.0, 0.012, -0.012)
 SIDE_GAPS_M = (0.014, 0.010, 0.006)
 """Gaps between open jaw and outline on each side to try, widest first: a wider object above the sensing height still
 fits between the jaws."""
-HEIGHT_RATIO = 0.45
-"""Height of the pads over the object's: just below the centre of mass of an even body, so that it hangs upright."""
+HEIGHT_RATIO = 0.55
+"""Height of the pads over the object's: just above the centre of mass of an even body, which then hangs upright as a
+pendulum. At 0.45, a figure of 100 mm that was touched by little of the pads turned by 30 degrees."""
 MARGIN_M = 0.001
 """Clearance of the open fingers beyond `CLEARANCE_M`. Source: sampling of outlines."""
 WIDTH_COST = 1.0
@@ -66,7 +67,7 @@ def outline_grasp(
 
 
 def pad_heights(height_m: float, gripper: Gripper) -> tuple[float, ...]:
-    """Return the heights of the pads' mid-point above the floor to try: low to middle, then as low as possible.
+    """Return the heights of the pads' mid-point above the floor to try: the middle, then as low as possible.
 
     Args:
         height_m: Height of the object.
