@@ -3,6 +3,9 @@
 A trial is one layout and one act: the mission finds and measures all objects, then pushes each once (`nudge_each`), or
 lifts each out and sets it down elsewhere (`clear_each`). At the end of the mission every object is compared with the
 truth: its centre with that of its true section at the height of the probe.
+
+If an object toppled or stands elsewhere, the search alone is run again with the same seed (`survey`), which makes the
+same motions up to the acts: what the probe toppled before is counted apart.
 """
 
 from __future__ import annotations
@@ -42,7 +45,8 @@ WITHIN_MM = 5.0
 """Position error that an act may leave. Source: the goal of the project."""
 COLUMNS = (
     "act", "seed", "candidate", "object", "tried", "done", "cause", "position_error_mm", "moved_mm", "tilt_deg",
-    "toppled", "peak_N", "duration_s", "exit_code", "status", "peak_force_N", "sim_time_s", "wall_time_s", "folder",
+    "toppled", "fallen_before", "peak_N", "duration_s", "exit_code", "status", "peak_force_N", "sim_time_s",
+    "wall_time_s", "folder",
 )  # fmt: skip
 
 
@@ -74,7 +78,12 @@ def run_trial(head: Row, request: RunRequest) -> Row:
     row = head | {k: done.result.get(k) for k in COLUMNS if k in done.result}
     row |= {"exit_code": done.exit_code, "cause": "" if done.exit_code == 0 else cause(done.result)}
     sections = sections_of(request.mission, request.objects, request.world)
-    return row | {"objects": score(read_run(done.folder), sections, head["act"])}
+    record = read_run(done.folder)
+    objects = score(record, sections, head["act"])
+    if any(t.get("toppled") or not within(t) for t in objects):
+        survey = replace(request, mission="survey", out=done.folder.with_name(f"{done.folder.name}-survey"))
+        objects = score(record, sections, head["act"], read_run(launch_trial(survey).folder))
+    return row | {"objects": objects}
 
 
 def _failed(head: Row, error: Exception) -> Row:
@@ -101,9 +110,10 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
     Rates have Wilson intervals over the objects. `..._over_worlds` is the mean of the layouts' rates, with a bootstrap
     interval: objects of one layout are not independent. An object that was moved but whose candidate belongs to none
-    counts as not within.
+    counts as not within. Objects that had fallen before count only in `fallen_before`.
     """
-    worlds = [list(r["objects"]) for r in rows]
+    everything = [t for r in rows for t in r["objects"]]
+    worlds = [[t for t in r["objects"] if not t.get("fallen_before")] for r in rows]
     things = [t for world in worlds for t in world]
     done = [t for t in things if t["done"]]
     tried = [t for t in things if t["tried"]]
@@ -112,6 +122,7 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "worlds": len(rows),
         "worlds_failed": dict(Counter(r["cause"] for r in rows if r["cause"]).most_common()),
+        "fallen_before": sum(bool(t.get("fallen_before")) for t in everything),
         "asked": len(things),
         "done": wilson(len(done), len(things)),
         "done_of_tried": wilson(len(done), len(tried)),

@@ -52,13 +52,16 @@ def windows(record: RunRecord) -> list[Window]:
     return [Window(k, begin, ended.get(k, record.span_s[1])) for k, begin in sorted(begun.items(), key=lambda b: b[1])]
 
 
-def score(record: RunRecord, sections: Mapping[str, FeltSection], act: str) -> list[dict[str, Any]]:
+def score(
+    record: RunRecord, sections: Mapping[str, FeltSection], act: str, survey: RunRecord | None = None
+) -> list[dict[str, Any]]:
     """Return one row for each act of a run.
 
     Args:
         record: The run, with its truth.
         sections: Probe sections of the objects by name.
         act: `nudge` or `clear`.
+        survey: A run of the same seed that ends before the acts; it shows what the probe toppled. None: nothing.
 
     Raises:
         BadInput: The record has no truth.
@@ -68,9 +71,13 @@ def score(record: RunRecord, sections: Mapping[str, FeltSection], act: str) -> l
         raise BadInput(f"{record.path}: no truth is written beside this record; only a simulation can be scored")
     layout = true_layout(record.truth, pose_B_K, dict(sections))
     tilts = [tilt_deg(a, b) for a, b in zip(record.truth["start"], record.truth["end"], strict=True)]
+    fallen = [False] * len(tilts)
+    if survey is not None and survey.truth is not None:
+        pairs = zip(survey.truth["start"], survey.truth["end"], strict=True)
+        fallen = [tilt_deg(a, b) >= TOPPLED_DEG for a, b in pairs]
     places = record.of_kind("candidate")
     whose = owners(places, layout, windows(record)[0].begin_s if windows(record) else np.inf)
-    return [_row(record, w, act, places, layout, tilts, whose.get(w.index)) for w in windows(record)]
+    return [_row(record, w, act, places, layout, tilts, fallen, whose.get(w.index)) for w in windows(record)]
 
 
 def owners(places: Sequence[RecordedEvent], layout: TrueLayout, until_s: float) -> dict[int, int]:
@@ -86,7 +93,7 @@ def owners(places: Sequence[RecordedEvent], layout: TrueLayout, until_s: float) 
 
 def _row(
     record: RunRecord, window: Window, act: str, places: Sequence[RecordedEvent], layout: TrueLayout,
-    tilts: Sequence[float], thing: int | None,
+    tilts: Sequence[float], fallen: Sequence[bool], thing: int | None,
 ) -> dict[str, Any]:  # fmt: skip
     events = [e for e in record.events if window.begin_s <= e.stamp_s <= window.end_s]
     failures = [e for e in events if e.kind == "failure"]
@@ -110,7 +117,8 @@ def _row(
     row["position_error_mm"] = 1e3 * float(np.linalg.norm(estimated - true[thing]))
     row["moved_mm"] = 1e3 * float(np.linalg.norm(true[thing] - before[thing]))
     row["tilt_deg"] = tilts[thing]
-    row["toppled"] = tilts[thing] >= TOPPLED_DEG
+    row["fallen_before"] = fallen[thing]
+    row["toppled"] = tilts[thing] >= TOPPLED_DEG and not fallen[thing]
     row["peak_N"] = _peak_N(record, window)
     return row
 

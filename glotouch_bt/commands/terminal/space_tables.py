@@ -31,6 +31,7 @@ def print_space(summary: dict[str, Any], folder: Path) -> None:
         ("the same, interval over layouts", *(over_worlds(c["within_over_worlds"]) for c in columns)),
         ("position error, mm: median, 95 %, largest", *(spread(c["position_error_mm"]) for c in columns)),
         ("toppled", *(rate(c["toppled"]) for c in columns)),
+        ("fallen before, not counted", *(str(c["fallen_before"]) for c in columns)),
         ("wrist force, N: median, 95 %, largest", *(spread(c["peak_N"]) for c in columns)),
         ("largest true peak force, N", *(f"{c['largest_peak_force_N']:.1f}" for c in columns)),
         ("safety stops", *(rate(c["safety_stops"]) for c in columns)),
