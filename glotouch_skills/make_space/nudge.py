@@ -22,6 +22,8 @@ BUMP_N = 1.2
 object of 80 mm with 2.1 N."""
 RETREAT_M = 0.006
 """Way back from the object before the hand rises, so that the fingers do not rub along it. Source: ours."""
+SHORT_M = 0.001
+"""A push that was stopped this much before its end counts as complete: the hand is decelerating. Source: ours."""
 HEAD = ("object", "direction, deg", "pushed, mm", "resistance, N", "peak, N", "end")
 """Head of the table in the report."""
 
@@ -41,6 +43,7 @@ class NudgeParams(SkillParams):
         "Direction of the push in the container, from x, if a distance is given", unit="deg", default=0.0, ge=-360.0,
         le=360.0,
     )  # fmt: skip
+    from_long_side: bool = param("Count that direction from the outline's long side, not from x", default=False)
     speed_m_s: float = param("Speed of the push", unit="m/s", default=0.02, gt=0.0, le=0.03)
     max_N: float = param("Resistance that ends the push", unit="N", default=6.0, gt=0.0, le=10.0)
     height_m: float = param(
@@ -132,7 +135,7 @@ class Nudge(Skill):
             raise
         self.touchsets = tuple(t for t in self.touchsets if t.candidate.index != moving.index)
         self.refused = tuple(key for key in self.refused if key[0] not in (target.index, moving.index))
-        if felt.resistance_N < MIN_FELT_N:
+        if not felt.stopped and felt.resistance_N < MIN_FELT_N:
             self._doubt(moving.index)
             self._tell(push, felt, "nothing resisted")
             raise self.NOTHING_PUSHED(
@@ -149,6 +152,9 @@ class Nudge(Skill):
         self._doubt(*push.near)
         self.event("candidate", candidate=moved, moved_m=shift_m, ended="pushed")
         self._tell(push, felt, "tipping" if felt.tipping else "stopped" if felt.stopped else "pushed")
+        if felt.stopped and felt.pushed_m > push.distance_m - SHORT_M:
+            self.cramped = ()
+            return
         if felt.tipping:
             raise self.TIPPING(
                 f"candidate {moving.index} was about to topple after {felt.pushed_m * 1e3:.0f} mm of "
@@ -184,7 +190,8 @@ class Nudge(Skill):
         planner = PushPlanner(self.known, half_extent, gripper, np.array(self._half_m))
         target = wanted[0]
         if p.distance_m > 0.0:
-            stated = planner.along(target, float(np.deg2rad(p.direction_deg)), p.distance_m)
+            side = target.contour.yaw_rad if p.from_long_side else 0.0
+            stated = planner.along(target, side + float(np.deg2rad(p.direction_deg)), p.distance_m)
             if isinstance(stated, str):
                 raise self.NO_PUSH(f"candidate {target.index} cannot be pushed that way: {stated}")
             return target, stated
