@@ -32,10 +32,18 @@ def friction(force_N: float, blocked_from_m: float = np.inf, lift_N: float = 0.0
 @pytest.fixture
 def make(bench, found):
     def make_one(
-        force_N=0.7, blocked_from_m=np.inf, lift_N=0.0, left_from_m=np.inf, cramped=(0,), others=(), foot=(), **params
+        force_N=0.7,
+        blocked_from_m=np.inf,
+        lift_N=0.0,
+        left_from_m=np.inf,
+        cramped=(0,),
+        others=(),
+        foot=(),
+        yaw_rad=0.0,
+        **params,
     ):
         b = bench(tip_P_m=0.115, things=[friction(force_N, blocked_from_m, lift_N, left_from_m), *foot])
-        thing = found.box((0.0, 0.0), (0.06, 0.04), height_m=0.05)
+        thing = found.box((0.0, 0.0), (0.06, 0.04), yaw_rad, height_m=0.05)
         given = {"known": (thing, *others), "cramped_before": cramped}
         return b, b.make(Nudge, inputs=given, **{"distance_m": 0.03, "direction_deg": 0.0, **params})
 
@@ -52,6 +60,21 @@ def test_the_object_stands_where_the_fingers_stopped(make) -> None:
     assert b.of_kind("nudge")[0]["resistance_N"] == pytest.approx(0.7, abs=0.1)
     assert b.of_kind("report")[0]["title"] == "Pushes"
     assert float(b.arm.pose_B_P.position_m[2]) > -0.2 + 0.14
+
+
+def test_a_direction_may_be_counted_from_the_long_side(make) -> None:
+    b, skill = make(yaw_rad=0.5 * np.pi, direction_deg=-90.0, from_long_side=True)
+    b.run(skill)
+    assert b.of_kind("nudge")[0]["direction_deg"] == pytest.approx(0.0)
+    assert skill.candidates[0].contour.centre_K_m[0] > 0.01
+
+
+def test_a_push_that_is_stopped_at_its_end_is_complete(make) -> None:
+    b, skill = make(blocked_from_m=EDGE_X_M + 0.030 - 0.0023)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert b.of_kind("nudge")[0]["stopped"]
+    assert skill.candidates[0].contour.centre_K_m[0] == pytest.approx(0.03, abs=1.5e-3)
 
 
 def test_nudge__blocked__it_stops_softly_and_knows_where(make) -> None:
