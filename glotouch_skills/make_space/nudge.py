@@ -12,7 +12,7 @@ from glotouch_bt.robot import HOLD, MotionRefused, Pose
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import ABOVE_RATIO, OVER_TOP_M, glide, keeping_clear_of, rise_clear
 from glotouch_skills.common.planning import Push, PushPlanner, after_push
-from glotouch_skills.make_space.push_guard import TOUCHING_N, Felt, PushGuard, push_guard, standing_force_B_N
+from glotouch_skills.make_space.push_guard import STABLE, TOUCHING_N, Felt, PushGuard, push_guard, standing_force_B_N
 
 MIN_FELT_N = 0.08
 """Least mean resistance of an object that slides with the fingers. The lightest of CONDITIONS (40 g, friction 0.45)
@@ -224,8 +224,10 @@ class Nudge(Skill):
             beside = max(height - top_m - OVER_TOP_M, 0.0)
             paces = ((0.0, ABOVE_RATIO * p.descent_speed_m_s), (beside, p.descent_speed_m_s))
             reached = yield from glide(self.context, low, FREE_M_S, paces, BUMP_N)
+        behind, ahead = moving.span_m(push.yaw_K_rad)
+        may_topple = 0.5 * (ahead - behind) < STABLE * moving.height_m
         along_B = container.pose_B_K.rotation @ np.array([*push.along_K, 0.0])
-        guard: PushGuard = yield from push_guard(arm, along_B, p.max_N)
+        guard: PushGuard = yield from push_guard(arm, along_B, p.max_N, may_topple)
         if not reached or not np.linalg.norm(guard.free_B_N - free_B_N) <= TOUCHING_N:
             yield from rise_clear(arm)
             raise MotionRefused("nudge", "the fingers met something on the way down")

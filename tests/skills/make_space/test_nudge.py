@@ -40,10 +40,11 @@ def make(bench, found):
         others=(),
         foot=(),
         yaw_rad=0.0,
+        top_m=0.05,
         **params,
     ):
         b = bench(tip_P_m=0.115, things=[friction(force_N, blocked_from_m, lift_N, left_from_m), *foot])
-        thing = found.box((0.0, 0.0), (0.06, 0.04), yaw_rad, height_m=0.05)
+        thing = found.box((0.0, 0.0), (0.06, 0.04), yaw_rad, height_m=top_m)
         given = {"known": (thing, *others), "cramped_before": cramped}
         return b, b.make(Nudge, inputs=given, **{"distance_m": 0.03, "direction_deg": 0.0, **params})
 
@@ -95,11 +96,17 @@ def test_nudge__nothing_pushed__what_is_not_there_is_doubted(make) -> None:
 
 @pytest.mark.parametrize(("lift_N", "code"), [(0.2, None), (0.5, "tipping")])
 def test_nudge__tipping__it_ends_before_the_object_falls(make, lift_N: float, code: str | None) -> None:
-    b, skill = make(lift_N=lift_N)
+    b, skill = make(lift_N=lift_N, top_m=0.06)
     b.run(skill)
     assert (skill.reason.code if skill.reason else None) == code
     moved_m = skill.candidates[0].contour.centre_K_m[0]
-    assert moved_m == pytest.approx(0.03, abs=1e-3) if code is None else moved_m < 0.008
+    assert moved_m == pytest.approx(0.03, abs=1e-3) if code is None else moved_m < 0.015
+
+
+def test_an_object_that_is_too_flat_to_topple_is_pushed_on(make) -> None:
+    b, skill = make(lift_N=0.5, top_m=0.045)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
 
 
 def test_nudge__left__what_rolled_away_is_doubted(make) -> None:
