@@ -10,7 +10,7 @@ import numpy as np
 from glotouch_bt.perception.search import HALF_QUALITY_SD_M
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Array
-from glotouch_skills.common.planning.finger_space import sampled
+from glotouch_skills.common.planning import sampled
 
 ACROSS_SD_M = 0.002
 """Standard deviation of the object's place across the jaws: at the pads' height its middle is not that of the

@@ -11,7 +11,7 @@ from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.planning import Clearing, ClearPlanner, GraspPlan, Neighbour, Place, sampled
+from glotouch_skills.common.planning import Clearing, ClearPlanner, FreePlace, GraspPlan, Neighbour, sampled
 
 
 class ClearPlanParams(SkillParams):
@@ -47,7 +47,7 @@ class ClearPlan(Skill):
     cramped = In(tuple, "indices of candidates that lack space for the fingers", element=int, required=False)
     map = In(SearchMap, "what has been explored", required=False, expected=False)
     plan = Out(GraspPlan, "the grasp of the object to take out, with alternatives")
-    places = Out(tuple, "where to set it down, nearest first", element=Place)
+    places = Out(tuple, "where to set it down, nearest first", element=FreePlace)
 
     def run(self) -> SkillRun:
         """See the class."""

@@ -23,7 +23,7 @@ from glotouch_skills.common.hand import (
     require_clear,
     rise_clear,
 )
-from glotouch_skills.common.planning import GraspPlan, Neighbour, Place, gap_m
+from glotouch_skills.common.planning import FreePlace, GraspPlan, Neighbour, gap_m
 from glotouch_skills.make_space.carried import Grip, after_carry, centred_m
 
 OPEN_BY_M = 0.02
@@ -100,7 +100,7 @@ class SetDown(Skill):
     )
 
     made = In(GraspPlan, "how it was taken")
-    places = In(tuple, "where to set it down, preferred first", element=Place)
+    places = In(tuple, "where to set it down, preferred first", element=FreePlace)
     known = In(tuple, "all candidates", key="candidates", element=Candidate)
     felt_before = In(tuple, "touches so far", key="touchsets", element=TouchSet, required=False, expected=False)
     refused_before = In(
@@ -173,7 +173,7 @@ class SetDown(Skill):
             return now
         return replace(now, position_K_m=planned)
 
-    def _first_in_reach(self, moving: Candidate, taken: Grip) -> tuple[Place, Pose, float]:
+    def _first_in_reach(self, moving: Candidate, taken: Grip) -> tuple[FreePlace, Pose, float]:
         """Return the first place that the open hand reaches, its pose there, and the opening of the release.
 
         Raises:
@@ -206,7 +206,7 @@ class SetDown(Skill):
     def _pad_half_m(self) -> float:
         return 0.5 * self.context.arm.description.gripper.pad_window_m[0]
 
-    def _note(self, moving: Candidate, place: Place, taken: Grip, released: Grip, above_m: float) -> None:
+    def _note(self, moving: Candidate, place: FreePlace, taken: Grip, released: Grip, above_m: float) -> None:
         """Enter the object where it stands now, doubt what it may have moved, and report it."""
         moved = after_carry(moving, taken, released, self._pad_half_m)
         self.candidates = tuple(moved if c.index == moving.index else c for c in self.known)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.bench.retrieve import cause
-from glotouch_bt.bench.search.trial import sections_of
+from glotouch_bt.bench.search import sections_of
 from glotouch_bt.bench.space.scoring import score
 from glotouch_bt.bench.statistics import bootstrap_mean, wilson
 from glotouch_bt.campaign import (

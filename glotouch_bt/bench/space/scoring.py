@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.bench.planar import FeltSection
-from glotouch_bt.bench.search.scoring import Found, TrueLayout, assign
-from glotouch_bt.bench.search.trial import true_layout
+from glotouch_bt.bench.search import Found, TrueLayout, assign, true_layout
 from glotouch_bt.report import RecordedEvent, RunRecord
 from glotouch_bt.robot import Array, BadInput, Pose
 

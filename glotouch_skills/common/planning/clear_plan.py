@@ -45,7 +45,7 @@ PLACES_AT_ONCE = 250
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class FreePlace:
     """Where to set an object down: a turn about its outline's centre, then a displacement.
 
     Attributes:
@@ -80,7 +80,7 @@ class Clearing:
     """
 
     grasp: GraspPlan
-    places: tuple[Place, ...]
+    places: tuple[FreePlace, ...]
     space_m: float = math.nan
 
 
@@ -143,9 +143,9 @@ class ClearPlanner:
             return
         at = Stance(grasp.position_K_m[:2], grasp.yaw_rad, grasp.opening_m)
         for gap in GAPS_M:
-            places: list[Place] = []
+            places: list[FreePlace] = []
             for found in self._places(moving, at, gap, others, leave=target is None):
-                if isinstance(found, Place):
+                if isinstance(found, FreePlace):
                     places.append(found)
                 yield None
                 if len(places) == MAX_PLACES:
@@ -159,13 +159,13 @@ class ClearPlanner:
     def _space(self, target: Candidate, neighbours: Sequence[Neighbour]) -> float:
         return finger_space_m(target, [*neighbours, *self.obstacles], self.half_extent_m, self.gripper)
 
-    def _space_after(self, target: Candidate, moving: Candidate, place: Place, others: list[Neighbour]) -> float:
+    def _space_after(self, target: Candidate, moving: Candidate, place: FreePlace, others: list[Neighbour]) -> float:
         there = placed(Neighbour.of(moving), place)
         return self._space(target, [*(n for n in others if n.index != target.index), there])
 
     def _places(
         self, moving: Candidate, at: Stance, gap: float, others: list[Neighbour], leave: bool
-    ) -> Iterator[Place | None]:  # fmt: skip
+    ) -> Iterator[FreePlace | None]:  # fmt: skip
         """Yield free places, nearest first and `PLACES_APART_M` apart, and None now and then."""
         own, centre = Neighbour.of(moving), moving.contour.centre_K_m
         standing = [*others, *self.obstacles]
@@ -173,7 +173,7 @@ class ClearPlanner:
         centres = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 2)
         rated: list[tuple[float, float, Array]] = []
         for turn in TURNS_RAD:
-            turned = placed(own, Place(moving.index, centre, np.zeros(2), turn, gap))
+            turned = placed(own, FreePlace(moving.index, centre, np.zeros(2), turn, gap))
             for k in range(0, len(centres), PLACES_AT_ONCE):
                 some = centres[k : k + PLACES_AT_ONCE] - centre
                 free = free_gap_m(turned, some, standing, self.half_extent_m) >= gap
@@ -181,9 +181,9 @@ class ClearPlanner:
                     free &= free_gap_m(turned, some, [own], self.half_extent_m) >= 0.0
                 rated += [(float(np.linalg.norm(shift)), turn, shift) for shift in some[free]]
                 yield None
-        chosen: list[Place] = []
+        chosen: list[FreePlace] = []
         for _, turn, shift in sorted(rated, key=lambda r: (r[0], abs(r[1]))):
-            place = Place(moving.index, centre, shift, turn, gap)
+            place = FreePlace(moving.index, centre, shift, turn, gap)
             if any(np.linalg.norm(shift - p.shift_K_m) < PLACES_APART_M for p in chosen):
                 continue
             hand = Stance(place.moved(at.position_K_m), at.yaw_K_rad + turn, at.opening_m)
@@ -195,7 +195,7 @@ class ClearPlanner:
                 yield None
 
 
-def placed(one: Neighbour, place: Place) -> Neighbour:
+def placed(one: Neighbour, place: FreePlace) -> Neighbour:
     """Return the envelope of an object at a place."""
     contour = one.contour
     points = np.array([place.moved(p) for p in one.points_K_m])

@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import Pose
-from glotouch_skills.common.planning import Place
+from glotouch_skills.common.planning import FreePlace
 from glotouch_skills.common.planning.grasp_plan import GraspPlan
 from glotouch_skills.make_space.set_down import SetDown
 
@@ -28,7 +28,7 @@ def make(bench, found):
         b.go(b.arm.line(Pose.pointing_down(HIGH_B_M, b.arm.pose_B_P.yaw_rad), 0.2, check=False))
         b.go(b.arm.jaws(0.0, speed_m_s=0.2))
         thing = found.round((0.01, 0.04), 0.025)
-        place = Place(0, thing.contour.centre_K_m, np.asarray(shift_m), math.radians(turn_deg), 0.02)
+        place = FreePlace(0, thing.contour.centre_K_m, np.asarray(shift_m), math.radians(turn_deg), 0.02)
         b.opened = []
         cycle = b.robot.cycle
 

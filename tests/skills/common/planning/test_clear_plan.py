@@ -10,7 +10,7 @@ import pytest
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.perception.touch import signed_distance
 from glotouch_skills.common.planning import NEEDED_M, Clearing, ClearPlanner, Neighbour, finger_space_m
-from glotouch_skills.common.planning.clear_plan import GAPS_M, GRID_M, Place, free_gap_m, placed
+from glotouch_skills.common.planning.clear_plan import GAPS_M, GRID_M, FreePlace, free_gap_m, placed
 from glotouch_skills.make_space.carried import Grip, after_carry
 
 GRIPPER = RIZON4_XENSE.gripper
@@ -24,7 +24,7 @@ def last(steps) -> Clearing | None:
     return found
 
 
-def stands_at(place: Place, thing):
+def stands_at(place: FreePlace, thing):
     """The object where a place says, by the bookkeeping of the carried object."""
     centre = thing.contour.centre_K_m
     return after_carry(thing, Grip(centre, 0.0), Grip(place.moved(centre), place.turn_rad), 0.009)
@@ -40,7 +40,7 @@ def test_the_gap_of_two_discs_is_the_distance_less_their_radii(found, shift_m: f
 
 def test_a_turned_box_reaches_the_wall_with_its_other_side(found) -> None:
     box = Neighbour.of(found.box((0.0, 0.0), (0.08, 0.04)))
-    turned = placed(box, Place(0, np.zeros(2), np.zeros(2), 0.5 * math.pi, 0.0))
+    turned = placed(box, FreePlace(0, np.zeros(2), np.zeros(2), 0.5 * math.pi, 0.0))
     shift = np.array([[0.1, 0.0]])
     assert free_gap_m(box, shift, [], HALF)[0] == pytest.approx(0.05 - 0.04, abs=1e-6)
     assert free_gap_m(turned, shift, [], HALF)[0] == pytest.approx(0.05 - 0.02, abs=1e-6)
