@@ -7,6 +7,7 @@ down where it would rise, and pushes it up. A large vertical share of the force 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -36,6 +37,8 @@ touch at three quarters of the height at most."""
 MIN_TIP_N = 0.15
 """Least resistance for which the ratio is judged. The noise of a mean over `TIP_S` is 0.005 N; the wrist's offset in
 motion is up to 0.1 N."""
+MET_S = 0.1
+"""Time over which the median resistance shows that the object was met: a start of the hand is felt for half of it."""
 LEFT_FROM, LEFT_TO = 0.006, 0.002
 """Distances before the stop, m, between which an object that slides is still felt; nearer, the hand decelerates."""
 LEFT_RATIO = 0.35
@@ -57,6 +60,7 @@ class Felt:
         stopped: The resistance, or the tipping moment, ended the push.
         tipping: The object was about to topple.
         left: The object left the fingers before they stopped.
+        early_m: Distance by which the object was met earlier than traced; NaN if it was not met.
     """
 
     edge_m: float
@@ -66,6 +70,7 @@ class Felt:
     stopped: bool
     tipping: bool = False
     left: bool = False
+    early_m: float = math.nan
 
 
 @dataclass
@@ -108,12 +113,20 @@ class PushGuard:
 
     def _is_tipping(self) -> bool:
         """Return True if a large share of the force has pointed upwards for `TIP_S`, after the object has settled."""
-        met = next((x for x, f in zip(self.along_m, self.resistance_N, strict=True) if f >= MIN_TIP_N), None)
         n = round(TIP_S / self.arm.period_s)
-        if met is None or len(self.along_m) < n or self.along_m[-n] < met + SEAT_M:
+        if len(self.along_m) < n or not self.along_m[-n] >= self.met_m() + SEAT_M:
             return False
         resistance, lift = (float(np.mean(values[-n:])) for values in (self.resistance_N, self.lift_N))
         return resistance >= MIN_TIP_N and lift > TIP_RATIO * resistance
+
+    def met_m(self) -> float:
+        """Return the coordinate of P along the push where the object was met; NaN if it was not."""
+        force, n = np.array(self.resistance_N), round(MET_S / self.arm.period_s)
+        if len(force) < n:
+            return math.nan
+        felt = np.median(np.lib.stride_tricks.sliding_window_view(force, n), axis=1) >= MIN_TIP_N
+        met = np.flatnonzero(felt & (force[: len(felt)] >= MIN_TIP_N))
+        return self.along_m[int(met[0])] if met.size else math.nan
 
     def has_left(self) -> bool:
         """Return True if the resistance had fallen before the fingers stopped."""
@@ -144,6 +157,7 @@ class PushGuard:
             stopped=stopped,
             tipping=self.tipping,
             left=not stopped and self.has_left(),
+            early_m=push.approach_m - (self.met_m() - self.along_m[0]) if self.along_m else math.nan,
         )
 
 

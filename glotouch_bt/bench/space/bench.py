@@ -5,7 +5,7 @@ lifts each out and sets it down elsewhere (`clear_each`). At the end of the miss
 truth: its centre with that of its true section at the height of the probe.
 
 If an object toppled or stands elsewhere, the search alone is run again with the same seed (`survey`), which makes the
-same motions up to the acts: what the probe toppled before is counted apart.
+same motions up to the acts: what the probe toppled or moved before is counted apart.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ WITHIN_MM = 5.0
 """Position error that an act may leave. Source: the goal of the project."""
 COLUMNS = (
     "act", "seed", "candidate", "object", "tried", "done", "cause", "position_error_mm", "moved_mm", "tilt_deg",
-    "toppled", "fallen_before", "peak_N", "duration_s", "exit_code", "status", "peak_force_N", "sim_time_s",
-    "wall_time_s", "folder",
+    "toppled", "fallen_before", "error_before_mm", "peak_N", "duration_s", "exit_code", "status", "peak_force_N",
+    "sim_time_s", "wall_time_s", "folder",
 )  # fmt: skip
 
 
@@ -129,6 +129,7 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "not_done": dict(Counter(t["cause"] for t in things if not t["done"]).most_common()),
         "within": wilson(sum(map(within, done)), len(done)),
         "within_over_worlds": bootstrap_mean(shares),
+        "off_before": sum(t.get("error_before_mm", 0.0) > WITHIN_MM for t in done if not within(t)),
         "position_error_mm": _quantiles(errors),
         "toppled": wilson(sum(bool(t.get("toppled")) for t in things), len(things)),
         "safety_stops": wilson(sum(r.get("exit_code") == 3 for r in rows), len(rows)),

@@ -70,13 +70,26 @@ def score(
         raise BadInput(f"{record.path}: no truth is written beside this record; only a simulation can be scored")
     layout = true_layout(record.truth, pose_B_K, dict(sections))
     tilts = [tilt_deg(a, b) for a, b in zip(record.truth["start"], record.truth["end"], strict=True)]
-    fallen = [False] * len(tilts)
-    if survey is not None and survey.truth is not None:
-        pairs = zip(survey.truth["start"], survey.truth["end"], strict=True)
-        fallen = [tilt_deg(a, b) >= TOPPLED_DEG for a, b in pairs]
     places = record.of_kind("candidate")
     whose = owners(places, layout, windows(record)[0].begin_s if windows(record) else np.inf)
-    return [_row(record, w, act, places, layout, tilts, fallen, whose.get(w.index)) for w in windows(record)]
+    rows = [_row(record, w, act, places, layout, tilts, whose.get(w.index)) for w in windows(record)]
+    if survey is not None and survey.truth is not None:
+        _attribute(rows, whose, survey, true_layout(survey.truth, pose_B_K, dict(sections)))
+    return rows
+
+
+def _attribute(rows: Sequence[dict[str, Any]], whose: Mapping[int, int], survey: RunRecord, layout: TrueLayout) -> None:
+    """Add what was so before the acts: objects that the probe had toppled, and the errors of the map."""
+    last = {int(e.data["candidate"]["index"]): e.data["candidate"]["contour"] for e in survey.of_kind("candidate")}
+    for row in rows:
+        thing = whose.get(row["candidate"])
+        if thing is None or row["candidate"] not in last:
+            continue
+        tilt = tilt_deg(survey.truth["start"][thing], survey.truth["end"][thing])
+        row["fallen_before"] = tilt >= TOPPLED_DEG
+        row["toppled"] = row["toppled"] and not row["fallen_before"]
+        mapped = np.array(last[row["candidate"]]["centre_K_m"], dtype=np.float64)
+        row["error_before_mm"] = 1e3 * float(np.linalg.norm(mapped - layout.centres_K_m[thing]))
 
 
 def owners(places: Sequence[RecordedEvent], layout: TrueLayout, until_s: float) -> dict[int, int]:
@@ -92,7 +105,7 @@ def owners(places: Sequence[RecordedEvent], layout: TrueLayout, until_s: float) 
 
 def _row(
     record: RunRecord, window: Window, act: str, places: Sequence[RecordedEvent], layout: TrueLayout,
-    tilts: Sequence[float], fallen: Sequence[bool], thing: int | None,
+    tilts: Sequence[float], thing: int | None,
 ) -> dict[str, Any]:  # fmt: skip
     events = [e for e in record.events if window.begin_s <= e.stamp_s <= window.end_s]
     failures = [e for e in events if e.kind == "failure"]
@@ -116,8 +129,7 @@ def _row(
     row["position_error_mm"] = 1e3 * float(np.linalg.norm(estimated - true[thing]))
     row["moved_mm"] = 1e3 * float(np.linalg.norm(true[thing] - before[thing]))
     row["tilt_deg"] = tilts[thing]
-    row["fallen_before"] = fallen[thing]
-    row["toppled"] = tilts[thing] >= TOPPLED_DEG and not fallen[thing]
+    row["toppled"] = tilts[thing] >= TOPPLED_DEG
     row["peak_N"] = _peak_N(record, window)
     return row
 

@@ -75,6 +75,7 @@ def test_what_the_probe_toppled_is_not_counted_as_toppled_by_the_act() -> None:
     assert score(fallen, SECTIONS, "nudge")[0]["toppled"]
     (row,) = score(fallen, SECTIONS, "nudge", survey=fallen)
     assert (row["toppled"], row["fallen_before"]) == (False, True)
+    assert row["error_before_mm"] == pytest.approx(2.0)
     assert score(fallen, SECTIONS, "nudge", survey=run())[0]["toppled"]
 
 
@@ -91,7 +92,10 @@ def thing(error_mm: float | None, **more: Any) -> dict[str, Any]:
 
 def test_everything_that_was_asked_for_counts() -> None:
     rows = [
-        {"cause": "", "objects": [thing(1.0), thing(7.0, toppled=True), thing(50.0, fallen_before=True)]},
+        {
+            "cause": "",
+            "objects": [thing(1.0), thing(7.0, toppled=True, error_before_mm=6.0), thing(50.0, fallen_before=True)],
+        },
         {"cause": "", "objects": [thing(2.0), thing(None, done=False, tried=False, cause="nudge: no_push")]},
         {"cause": "tool_pickup: no_probe", "objects": []},
     ]
@@ -103,6 +107,7 @@ def test_everything_that_was_asked_for_counts() -> None:
     assert summary["not_done"] == {"nudge: no_push": 1}
     assert summary["worlds_failed"] == {"tool_pickup: no_probe": 1}
     assert summary["position_error_mm"]["max"] == 7.0
+    assert summary["off_before"] == 1
     assert space.summarise([])["within"]["n"] == 0
 
 

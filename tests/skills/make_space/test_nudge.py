@@ -40,11 +40,12 @@ def make(bench, found):
         others=(),
         foot=(),
         yaw_rad=0.0,
+        at_m=0.0,
         top_m=0.05,
         **params,
     ):
         b = bench(tip_P_m=0.115, things=[friction(force_N, blocked_from_m, lift_N, left_from_m), *foot])
-        thing = found.box((0.0, 0.0), (0.06, 0.04), yaw_rad, height_m=top_m)
+        thing = found.box((at_m, 0.0), (0.06, 0.04), yaw_rad, height_m=top_m)
         given = {"known": (thing, *others), "cramped_before": cramped}
         return b, b.make(Nudge, inputs=given, **{"distance_m": 0.03, "direction_deg": 0.0, **params})
 
@@ -107,6 +108,15 @@ def test_an_object_that_is_too_flat_to_topple_is_pushed_on(make) -> None:
     b, skill = make(lift_N=0.5, top_m=0.045)
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
+
+
+@pytest.mark.parametrize("off_m", [0.002, -0.006, 0.008])
+def test_an_object_met_elsewhere_than_traced_is_doubted(make, found, off_m: float) -> None:
+    b, skill = make(at_m=off_m)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert b.of_kind("nudge")[0]["early_m"] == pytest.approx(off_m, abs=1.5e-3)
+    assert skill.doubtful == (() if abs(off_m) < 0.005 else (0,))
 
 
 def test_nudge__left__what_rolled_away_is_doubted(make) -> None:
