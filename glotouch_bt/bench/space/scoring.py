@@ -107,7 +107,7 @@ def _row(
     record: RunRecord, window: Window, act: str, places: Sequence[RecordedEvent], layout: TrueLayout,
     tilts: Sequence[float], thing: int | None,
 ) -> dict[str, Any]:  # fmt: skip
-    events = [e for e in record.events if window.begin_s <= e.stamp_s <= window.end_s]
+    events = [e for e in record.events if window.begin_s < e.stamp_s <= window.end_s]
     failures = [e for e in events if e.kind == "failure"]
     last = max((e.stamp_s for e in events if e.kind == "candidate" and e.data.get("ended") == ENDED[act]), default=None)
     later = [e for e in failures if last is not None and e.stamp_s >= last]

@@ -70,6 +70,11 @@ def test_a_push_that_failed_is_not_done_and_has_its_cause() -> None:
     assert (row["done"], row["tried"]) == (False, False)
 
 
+def test_what_ended_as_an_act_began_belongs_to_the_act_before() -> None:
+    (row,) = score(run(placed(10.0, 0.01, "pushed"), FAILED), SECTIONS, "nudge")
+    assert (row["done"], row["tried"]) == (False, False)
+
+
 def test_what_the_probe_toppled_is_not_counted_as_toppled_by_the_act() -> None:
     fallen = run(placed(15.0, 0.028, "pushed"), quat=turned(90.0, 0))
     assert score(fallen, SECTIONS, "nudge")[0]["toppled"]
