@@ -24,7 +24,7 @@ RETREAT_M = 0.006
 """Way back from the object before the hand rises, so that the fingers do not rub along it. Source: ours."""
 EARLY_M = 0.005
 """An object that is met this much earlier or later than it was traced may stand elsewhere: the probe moved it, or it
-has a low foot. Of 22 pushes of `bench space` (realistic), 21 met the object within 3 mm."""
+has a low foot. Of 22 pushes of `bench space` (realistic), 21 met the object within 4 mm."""
 SHORT_M = 0.001
 """A push that was stopped this much before its end counts as complete: the hand is decelerating. Source: ours."""
 HEAD = ("object", "direction, deg", "pushed, mm", "resistance, N", "peak, N", "end")

@@ -24,8 +24,9 @@ STEADY_SHARE = 0.5
 
 
 TIP_RATIO = 0.5
-"""Upward force over resistance at which the object is about to topple. Of eleven pushes of `bench space` (realistic,
-seeds 56000-56003) without this rule, one of five above it toppled, and none of six below."""
+"""Upward force over resistance at which the object is about to topple. Of 13 pushes of standing objects
+(`bench space`, realistic, seeds 56000-56003) without this rule, one of five above it toppled, and none of eight
+below."""
 TIP_S = 0.3
 """Time over which that ratio is averaged: 6 mm of the push."""
 SEAT_M = 0.004
@@ -39,8 +40,10 @@ MIN_TIP_N = 0.15
 motion is up to 0.1 N."""
 MET_S = 0.1
 """Time over which the median resistance shows that the object was met: a start of the hand is felt for half of it."""
-LEFT_FROM, LEFT_TO = 0.006, 0.002
-"""Distances before the stop, m, between which an object that slides is still felt; nearer, the hand decelerates."""
+LEFT_FROM_M = 0.006
+"""Distance before the stop from which the resistance shows whether the object is still there. Source: ours."""
+LEFT_TO_M = 0.002
+"""Distance before the stop at which that ends: nearer, the hand decelerates. Source: ours."""
 LEFT_RATIO = 0.35
 """Resistance there over the median of the push below which the object has left the fingers: it rolled or toppled."""
 TOUCHING_N = 0.3
@@ -131,8 +134,8 @@ class PushGuard:
     def has_left(self) -> bool:
         """Return True if the resistance had fallen before the fingers stopped."""
         force, to_go = np.array(self.resistance_N), max(self.along_m, default=0.0) - np.array(self.along_m)
-        last = force[(to_go >= LEFT_TO) & (to_go <= LEFT_FROM)]
-        felt = force[(force >= MIN_TIP_N) & (to_go > LEFT_FROM)]
+        last = force[(to_go >= LEFT_TO_M) & (to_go <= LEFT_FROM_M)]
+        felt = force[(force >= MIN_TIP_N) & (to_go > LEFT_FROM_M)]
         return bool(last.size and felt.size and last.mean() < LEFT_RATIO * np.median(felt))
 
     def at_rest(self, container: Container, push: Push, half_m: float, stopped: bool) -> Motion[Felt]:
