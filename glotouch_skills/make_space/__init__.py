@@ -1,1 +1,1 @@
-"""Skills that make space for the fingers: push an object aside."""
+"""Skills that make space for the fingers: push an object aside, or lift it out and set it down elsewhere."""

@@ -6,19 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import JawRestDetector, hand_pose_B
+from glotouch_bt.motion import hand_pose_B
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Pose
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import glide, keeping_clear_of, release, rise_clear
+from glotouch_skills.common.hand import RELEASE_HEIGHT_M, keeping_clear_of, let_jaws_rest, lower, release, rise_clear
 from glotouch_skills.common.planning import GraspPlan
-
-SLOW_FROM_M = 0.03
-"""Height above its place from which the object is lowered slowly."""
-JAW_REST_S = 1.5
-"""Longest wait for jaws that lost their object to stop closing."""
-RELEASE_HEIGHT_M = 0.0015
-"""Release the object at this height above its place: a stiff arm would press it hard on the floor."""
 
 
 class PutBackParams(SkillParams):
@@ -67,7 +60,7 @@ class PutBack(Skill):
         """See the class."""
         arm, p, made = self.context.arm, self.params, self.made
         yield from rise_clear(arm, p.speed_m_s)
-        yield from self._let_jaws_rest()
+        yield from let_jaws_rest(arm)
         apart = arm.aperture_m
         opening = min(max(apart, 0.0) + 0.02, arm.description.gripper.stroke_m)
         if apart < p.min_aperture_m or made is None:
@@ -78,14 +71,11 @@ class PutBack(Skill):
         place = hand_pose_B(arm, container, made.position_K_m + np.array([0.0, 0.0, RELEASE_HEIGHT_M]), made.yaw_rad)
         high = float(arm.pose_B_P.position_m[2])
         over = Pose(np.array([*place.position_m[:2], high]), place.quat)
-        near = Pose(place.position_m + np.array([0.0, 0.0, SLOW_FROM_M]), place.quat)
         others = [c for c in self.known or () if c.index != made.candidate]
         with keeping_clear_of(arm, others):
             if np.linalg.norm(over.position_m - arm.pose_B_P.position_m) > 1e-3:
                 yield from arm.line(over, p.speed_m_s, what="put back")
-            reached = yield from glide(self.context, near, p.approach_speed_m_s)
-            reached = reached and (yield from glide(self.context, place, p.lower_speed_m_s))
-        above = float(arm.pose_B_P.position_m[2] - place.position_m[2])
+            reached, above = yield from lower(self.context, place, p.approach_speed_m_s, p.lower_speed_m_s)
         if not reached and above > p.drop_m:
             yield from rise_clear(arm, p.speed_m_s)
             raise self.IN_THE_WAY(
@@ -94,12 +84,3 @@ class PutBack(Skill):
         yield from release(arm, opening)
         yield from rise_clear(arm, p.speed_m_s)
         self.event("put_back", candidate=made.candidate, above_m=above)
-
-    def _let_jaws_rest(self) -> SkillRun:
-        """Wait until the jaws rest: jaws that are still closing would look like jaws that hold something."""
-        arm = self.context.arm
-        watch = JawRestDetector(arm.period_s)
-        for _ in range(round(JAW_REST_S / arm.period_s)):
-            (seen,) = yield from arm.hold(arm.period_s)
-            if watch.still(seen.now_s, seen.gripper):
-                return

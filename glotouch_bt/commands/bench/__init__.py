@@ -15,6 +15,7 @@ from glotouch_bt.commands.bench.match import match
 from glotouch_bt.commands.bench.retrieve import retrieve
 from glotouch_bt.commands.bench.robustness import robustness
 from glotouch_bt.commands.bench.search import search
+from glotouch_bt.commands.bench.space import space
 from glotouch_bt.commands.bench.speed import speed
 
 bench = typer.Typer(
@@ -30,6 +31,7 @@ for _experiment in (
     match,
     robustness,
     contact,
+    space,
     detection,
     speed,
     faults,

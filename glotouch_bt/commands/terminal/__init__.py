@@ -30,3 +30,4 @@ from glotouch_bt.commands.terminal.force_tables import print_forces
 from glotouch_bt.commands.terminal.object_tables import print_objects
 from glotouch_bt.commands.terminal.progress import RunProgress
 from glotouch_bt.commands.terminal.run_end import print_end
+from glotouch_bt.commands.terminal.space_tables import print_space

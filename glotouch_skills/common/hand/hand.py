@@ -37,10 +37,13 @@ def require_clear(arm: Arm, pose_B_P: Pose, aperture_m: float, margin_m: float |
         raise MotionRefused("pose", blocked)
 
 
-def glide(context: Context, pose_B_P: Pose, speed_m_s: float, paces: Paces = ()) -> Motion[bool]:
+def glide(
+    context: Context, pose_B_P: Pose, speed_m_s: float, paces: Paces = (), bump_N: float = BUMP_N
+) -> Motion[bool]:
     """Move straight to a pose among objects and stop if the fingers touch one; return True if the pose was reached.
 
     The orientation must be the present one. The hand stops within 1 to 2 mm of the touch. `paces` as in `Arm.follow`.
+    `bump_N` is the force that counts as a touch.
 
     Raises:
         MotionRefused: Before moving.
@@ -57,7 +60,7 @@ def glide(context: Context, pose_B_P: Pose, speed_m_s: float, paces: Paces = ())
         step / length,
         np.array([0.0, 0.0, gripper.fingertip_below_P_m]),
         gripper.pose_E_P,
-        replace(GuardParams(), directional_N=BUMP_N, total_N=BUMP_N, sustained_N=BUMP_N, cutoff_Hz=BUMP_CUTOFF_HZ),
+        replace(GuardParams(), directional_N=bump_N, total_N=bump_N, sustained_N=bump_N, cutoff_Hz=BUMP_CUTOFF_HZ),
     )
     result = yield from arm.line(
         pose_B_P,

@@ -1,9 +1,19 @@
 """Plans that several skills share: stances of the open hand, closures, grasps, pushes, and the target's model."""
 
-from glotouch_skills.common.planning.finger_space import Neighbour, clearance_m, finger_clearance_m, finger_space_m
+from glotouch_skills.common.planning.clear_plan import Clearing, ClearPlanner, FreePlace
+from glotouch_skills.common.planning.finger_space import (
+    Neighbour,
+    clearance_m,
+    finger_clearance_m,
+    finger_space_m,
+    gap_m,
+    sampled,
+)
 from glotouch_skills.common.planning.grasp_holds import SHIFTS_M
 from glotouch_skills.common.planning.grasp_plan import GraspPlan, plan_grasp
+from glotouch_skills.common.planning.outline_grasp import outline_grasp
 from glotouch_skills.common.planning.push_plan import (
+    MAY_TOUCH_M,
     NEEDED_M,
     Push,
     PushPlanner,
