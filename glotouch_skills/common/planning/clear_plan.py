@@ -141,7 +141,7 @@ class ClearPlanner:
         yield None
         if grasp is None:
             return
-        at = Stance(grasp.position_K_m[:2], grasp.yaw_rad, grasp.opening_m)
+        at = Stance(grasp.position_K_m[:2], grasp.yaw_rad, grasp.opening_m, grasp.aperture_m)
         for gap in GAPS_M:
             places: list[FreePlace] = []
             for found in self._places(moving, at, gap, others, leave=target is None):
@@ -186,7 +186,7 @@ class ClearPlanner:
             place = FreePlace(moving.index, centre, shift, turn, gap)
             if any(np.linalg.norm(shift - p.shift_K_m) < PLACES_APART_M for p in chosen):
                 continue
-            hand = Stance(place.moved(at.position_K_m), at.yaw_K_rad + turn, at.opening_m)
+            hand = replace(at, position_K_m=place.moved(at.position_K_m), yaw_K_rad=at.yaw_K_rad + turn)
             space = finger_clearance_m(hand, standing, self.half_extent_m, self.gripper)
             if space >= CLEARANCE_M + RELEASE_MARGIN_M:
                 chosen.append(place)
