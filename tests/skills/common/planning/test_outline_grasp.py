@@ -42,7 +42,7 @@ def test_the_open_fingers_of_every_grasp_are_clear(found) -> None:
     plan = outline_grasp(thing, others, HALF, GRIPPER)
     assert plan is not None
     for one in (plan, *plan.alternatives):
-        at = Stance(one.position_K_m[:2], one.yaw_rad, one.opening_m)
+        at = Stance(one.position_K_m[:2], one.yaw_rad, one.opening_m, one.aperture_m)
         assert finger_clearance_m(at, others, HALF, GRIPPER) >= CLEARANCE_M
 
 
