@@ -11,7 +11,10 @@ from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchS
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillRun, param
-from glotouch_skills.common.hand import keeping_clear_of
+from glotouch_skills.common.hand import (
+    keeping_clear_of,
+    neighbours,
+)
 from glotouch_skills.common.planning import (
     MIN_GAP_M,
     ClosureParams,
@@ -72,7 +75,7 @@ class Squeeze(Skill):
         """See the class."""
         candidate = self.candidate
         arm = self.context.arm
-        others = tuple(c for c in (self.known or ()) if c.index != candidate.index)
+        others = neighbours(self.known or (), candidate.index)
         sequences: list[TouchSequence] = []
         refusals: list[str]
         with keeping_clear_of(arm, others):

@@ -14,7 +14,12 @@ from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchS
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import HOLD, Array, MotionRefused
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Context, Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import CLEARANCE_M, keeping_clear_of, require_clear
+from glotouch_skills.common.hand import (
+    CLEARANCE_M,
+    keeping_clear_of,
+    neighbours,
+    require_clear,
+)
 from glotouch_skills.common.planning import (
     TOO_LOW,
     ClosureParams,
@@ -250,7 +255,7 @@ class TouchNext(Skill):
         arm = self.context.arm
         place = np.array([*option.at.position_K_m, option.closure.height_m])
         pose = hand_pose_B(arm, self.context.world.container, place, option.at.yaw_K_rad)
-        others = [t.candidate for t in belief.touchsets if t.candidate.index != option.closure.candidate]
+        others = neighbours((t.candidate for t in belief.touchsets), option.closure.candidate)
         with keeping_clear_of(arm, others):
             for gap_m in side_gaps_m(self.params.side_gap_m):
                 at = option.at.opened(gap_m, arm.description.gripper)
@@ -275,7 +280,7 @@ class TouchNext(Skill):
             yield from self._rise(down)
             (candidate,) = (c for c in candidates if c.index == index)
             hand = Squeezing(self.context, candidate, chosen.at, self.params, self.jaw_zero)
-        with keeping_clear_of(self.context.arm, [c for c in candidates if c.index != index]):
+        with keeping_clear_of(self.context.arm, neighbours(candidates, index)):
             if hand is not down:
                 yield from hand.go_down(chosen.closure.height_m)
             elif not (yield from hand.move_to(chosen.closure.height_m)):

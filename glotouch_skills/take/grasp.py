@@ -16,6 +16,7 @@ from glotouch_skills.common.hand import (
     close_compliantly,
     descend,
     keeping_clear_of,
+    neighbours,
     require_clear,
 )
 from glotouch_skills.common.planning import GraspPlan
@@ -80,7 +81,7 @@ class Grasp(Skill):
     def run(self) -> SkillRun:
         """See the class."""
         plan = self.plan
-        others = tuple(c for c in (self.known or ()) if c.index != plan.candidate)
+        others = neighbours(self.known or (), plan.candidate)
         made: tuple[GraspPlan, ...] = self.before or ()
         self.graspable, self.doubtful = True, self.doubtful_before or ()
         options = sorted((plan, *plan.alternatives), key=lambda option: any(_same(option, m) for m in made))

@@ -10,7 +10,15 @@ from glotouch_bt.motion import hand_pose_B
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Pose
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import RELEASE_HEIGHT_M, keeping_clear_of, let_jaws_rest, lower, release, rise_clear
+from glotouch_skills.common.hand import (
+    RELEASE_HEIGHT_M,
+    keeping_clear_of,
+    let_jaws_rest,
+    lower,
+    neighbours,
+    release,
+    rise_clear,
+)
 from glotouch_skills.common.planning import GraspPlan
 
 
@@ -71,7 +79,7 @@ class PutBack(Skill):
         place = hand_pose_B(arm, container, made.position_K_m + np.array([0.0, 0.0, RELEASE_HEIGHT_M]), made.yaw_rad)
         high = float(arm.pose_B_P.position_m[2])
         over = Pose(np.array([*place.position_m[:2], high]), place.quat)
-        others = [c for c in self.known or () if c.index != made.candidate]
+        others = neighbours(self.known or (), made.candidate)
         with keeping_clear_of(arm, others):
             if np.linalg.norm(over.position_m - arm.pose_B_P.position_m) > 1e-3:
                 yield from arm.line(over, p.speed_m_s, what="put back")

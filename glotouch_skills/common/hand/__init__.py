@@ -1,6 +1,6 @@
 """Motions of the hand and the jaws that several skills share: rise, glide, close, release, weigh."""
 
-from glotouch_skills.common.hand.clearance_rules import keeping_clear_of, may_touch
+from glotouch_skills.common.hand.clearance_rules import keeping_clear_of, may_touch, neighbours
 from glotouch_skills.common.hand.compliant_close import close_compliantly, release
 from glotouch_skills.common.hand.descent import ABOVE_RATIO, OVER_TOP_M, descend
 from glotouch_skills.common.hand.hand import CLEARANCE_M, glide, require_clear

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 from glotouch_bt.motion import Arm
-from glotouch_bt.perception.touch import Candidate
+from glotouch_bt.perception.touch import Candidate, signed_distance
 from glotouch_bt.perception.touch.outline import envelope
 
 MIN_HEIGHT_M = 0.01
@@ -30,6 +30,22 @@ def may_touch(arm: Arm, part: str, *obstacles: str) -> Iterator[None]:
     finally:
         for obstacle in obstacles:
             arm.scene.disallow(part, obstacle)
+
+
+def neighbours(candidates: Iterable[Candidate], index: int) -> list[Candidate]:
+    """Return the candidates to keep clear of while the hand works on the one of an index.
+
+    Of two candidates with the centre of one inside the outline of the other, at least one outline is wrong: bodies do
+    not overlap so far. Such a neighbour would keep the hand off the object that it may be, and the descent is guarded.
+    """
+    every = list(candidates)
+    own = next((c for c in every if c.index == index), None)
+    return [c for c in every if c.index != index and not (own and _overlap(own, c))]
+
+
+def _overlap(one: Candidate, other: Candidate) -> bool:
+    pairs = ((one, other), (other, one))
+    return any(signed_distance(envelope(a), b.contour.centre_K_m[None])[0] < 0.0 for a, b in pairs)
 
 
 @contextmanager
