@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from glotouch_bt.robot import UnknownName
-from glotouch_skills.common.hand.clearance_rules import may_touch
+from glotouch_skills.common.hand.clearance_rules import may_touch, neighbours
 
 
 def test_taken_back_in_every_case(bench) -> None:
