@@ -170,7 +170,7 @@ def test_missions_and_nodes(command: CliRunner) -> None:
     assert "attempts" in command.invoke(cli.app, ["nodes", "retry"]).stdout
     listed = command.invoke(cli.app, ["missions"]).stdout
     assert "conditions: harsh, ideal, nominal" in listed
-    assert "subtrees: explore, find_objects" in listed
+    assert "explore, find_objects" in listed
     assert "expected_objects" in command.invoke(cli.app, ["missions", "retrieve"]).stdout
     for words in (["missions", "retriev"], ["nodes", "rety"]):
         assert "did you mean" in command.invoke(cli.app, words).stderr
