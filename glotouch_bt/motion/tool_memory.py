@@ -1,4 +1,4 @@
-"""What the arm remembers of the held tool: the space that it felt to be free, and its displacement in the hand.
+"""Memory of the held tool: the space that it felt to be free, and its displacement in the hand.
 
 The tool hangs straight down: its shaft stands above its ball. So where the ball passed without a contact, the column
 above is free at every height, except for what reaches in between the radii of shaft and ball. Objects are pushed by

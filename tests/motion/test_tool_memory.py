@@ -1,4 +1,4 @@
-"""What the arm remembers of the held tool: space that it felt to be free, and its displacement in the hand."""
+"""Memory of the held tool: space that it felt to be free, and its displacement in the hand."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Leave bodies that can touch nothing in a control period out of MuJoCo's collision detection.
 
 In every step MuJoCo computes a bounding box of each geom that can collide, asleep or not, and sorts all of them. For
-five objects of forty geoms and an arm this is a third of a step's time. A body that nothing comes near has no contacts,
-so a body whose categories are zero for a period gives the same contacts, and the same motion to the bit. The pads and
-the probe's handle touch in contact pairs of their own, which have no categories.
+five objects of forty geoms and an arm this is about a fifth of a step's time. A body that nothing comes near has no
+contacts, so a body whose categories are zero for a period gives the same contacts, and the same motion to the bit. The
+pads and the probe's handle touch in contact pairs of their own, which have no categories.
 """
 
 from __future__ import annotations

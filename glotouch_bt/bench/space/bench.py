@@ -40,7 +40,7 @@ from glotouch_bt.report import read_run
 from glotouch_bt.runs import RunRequest
 
 ACTS = ("nudge", "clear")
-"""What is done to each object; the mission is the act's name with `_each`."""
+"""Acts on each object; the mission is the name of the act with `_each`."""
 WITHIN_MM = 5.0
 """Position error that an act may leave. Source: the goal of the project."""
 COLUMNS = (
