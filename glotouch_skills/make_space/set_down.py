@@ -103,9 +103,6 @@ class SetDown(Skill):
     places = In(tuple, "where to set it down, preferred first", element=FreePlace)
     known = In(tuple, "all candidates", key="candidates", element=Candidate)
     felt_before = In(tuple, "touches so far", key="touchsets", element=TouchSet, required=False, expected=False)
-    refused_before = In(
-        tuple, "closures that could not be made", key="refused", element=tuple, required=False, expected=False
-    )
     doubtful_before = In(
         tuple, "indices of candidates that may have been moved", key="doubtful", element=int, required=False,
         expected=False,
@@ -116,14 +113,14 @@ class SetDown(Skill):
     candidates = Out(tuple, "all candidates, the carried one where it stands now", element=Candidate, always=True)
     cramped = Out(tuple, "none: what lacks space now is not known yet", element=int)
     touchsets = Out(tuple, "touches of objects that were not carried", element=TouchSet, always=True)
-    refused = Out(tuple, "closures that could not be made, of objects that were not carried", always=True)
+    refused = Out(tuple, "none: what stood in the way of a closure may be gone", element=tuple)
     doubtful = Out(tuple, "the same, with those that the object came close to", element=int, always=True)
     cleared = Out(tuple, "objects set down so far, with this one", element=tuple, always=True)
 
     def run(self) -> SkillRun:
         """See the class."""
         self.candidates, self.touchsets = self.known, self.felt_before or ()
-        self.refused, self.doubtful = self.refused_before or (), self.doubtful_before or ()
+        self.doubtful = self.doubtful_before or ()
         self.cleared = self.before or ()
         arm, p = self.context.arm, self.params
         yield from rise_clear(arm, p.speed_m_s)
@@ -211,7 +208,7 @@ class SetDown(Skill):
         moved = after_carry(moving, taken, released, self._pad_half_m)
         self.candidates = tuple(moved if c.index == moving.index else c for c in self.known)
         self.touchsets = tuple(t for t in self.touchsets if t.candidate.index != moving.index)
-        self.refused = tuple(key for key in self.refused if key[0] != moving.index)
+        self.refused = ()
         stands = [Neighbour.of(moving), Neighbour.of(moved)]
         others = [Neighbour.of(c) for c in self.known if c.index != moving.index]
         self._doubt(*(n.index for n in others if min(gap_m(s, n) for s in stands) < NEAR_M))

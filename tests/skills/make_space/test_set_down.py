@@ -39,7 +39,7 @@ def make(bench, found):
 
         b.robot.cycle = watch
         given = {"made": TAKEN, "places": (place,), "known": (thing, *others), "felt_before": felt}
-        return b, b.make(SetDown, inputs={**given, "refused_before": ((0, 0, 30, 0, 0), (1, 0, 30, 0, 0))})
+        return b, b.make(SetDown, inputs=given)
 
     return make_one
 
@@ -60,14 +60,14 @@ def test_it_is_let_go_of_at_its_place_and_stands_there_in_the_map(make, turn_deg
     assert len(skill.cleared) == 1
 
 
-def test_its_touches_are_given_up_and_what_stood_near_is_doubted(make, found) -> None:
+def test_its_touches_and_all_refusals_are_given_up_and_what_stood_near_is_doubted(make, found) -> None:
     near, far = found.round((0.01, 0.085), 0.018, index=1), found.round((0.10, 0.15), 0.018, index=2)
     felt = tuple(TouchSet(c, ()) for c in (found.round((0.01, 0.04), 0.025), near))
     b, skill = make(others=(near, far), felt=felt)
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
     assert [t.candidate.index for t in skill.touchsets] == [1]
-    assert skill.refused == ((1, 0, 30, 0, 0),)
+    assert skill.refused == ()
     assert skill.doubtful == (1,)
     assert skill.candidates[1:] == (near, far)
 
