@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -111,6 +113,7 @@ class TouchNext(Skill):
         self._down: Squeezing | None = None
         self._hopeless: frozenset[int] = frozenset()
         self._stood_B_m: Array | None = None
+        self._unfit: dict[int, list[str]] = {}
 
     def remember(self) -> object:
         """See `Skill`: the stance of a lowered hand."""
@@ -151,6 +154,7 @@ class TouchNext(Skill):
         self._hopeless = frozenset(t.candidate.index for t in vain if len(t.layers) >= MAX_VAIN_CLOSURES)
         why = recognition.enough(belief, self.params.confidence, self._hopeless)
         chosen = None if why else self._choose(belief, down)
+        self._tell_unfit()
         if chosen is not None and chosen.closure.candidate in self._unmeasured(belief):
             why = f"candidate {chosen.closure.candidate} would tell most, once the probe has measured it"
         if why or chosen is None:
@@ -238,33 +242,48 @@ class TouchNext(Skill):
             option: Option = found[i]
             if _key(option) in self.refused:
                 continue
-            at = self._fitting(belief, option, down)
-            if at is not None:
-                return replace(option, at=at, closure=replace(option.closure, gain_nats=float(gains[i][0])))
-            self._refuse(option)
+            try:
+                at = self._fitting(belief, option, down)
+            except MotionRefused as refusal:
+                self._refuse(option)
+                self._unfit.setdefault(option.closure.candidate, []).append(str(refusal))
+                continue
+            return replace(option, at=at, closure=replace(option.closure, gain_nats=float(gains[i][0])))
         return None
+
+    def _tell_unfit(self) -> None:
+        """Note the closures that were found not to fit, and the most frequent cause for each candidate."""
+        for index, causes in self._unfit.items():
+            ((cause, _),) = Counter(causes).most_common(1)
+            self.event("note", text=f"{len(causes)} of the closures on candidate {index} do not fit: {cause}")
+        self._unfit.clear()
 
     def _refuse(self, option: Option) -> None:
         """Record that a closure could not be made, for this skill and for later ones."""
         self.refused = (*self.refused, _key(option))
 
-    def _fitting(self, belief: Belief, option: Option, down: Squeezing | None) -> Stance | None:
-        """Return the option's stance, opened as far as fits beside the neighbours; None if the hand does not fit."""
+    def _fitting(self, belief: Belief, option: Option, down: Squeezing | None) -> Stance:
+        """Return the option's stance, opened as far as fits beside the neighbours.
+
+        Raises:
+            MotionRefused: The hand does not fit.
+        """
         if down is not None and option.at is down.at:
             return option.at
         arm = self.context.arm
         place = np.array([*option.at.position_K_m, option.closure.height_m])
         pose = hand_pose_B(arm, self.context.world.container, place, option.at.yaw_K_rad)
         others = neighbours((t.candidate for t in belief.touchsets), option.closure.candidate)
+        *wide, narrowest = (
+            option.at.opened(gap, arm.description.gripper) for gap in side_gaps_m(self.params.side_gap_m)
+        )
         with keeping_clear_of(arm, others):
-            for gap_m in side_gaps_m(self.params.side_gap_m):
-                at = option.at.opened(gap_m, arm.description.gripper)
-                try:
+            for at in wide:
+                with suppress(MotionRefused):
                     require_clear(arm, pose, at.opening_m, CLEARANCE_M)
-                except MotionRefused:
-                    continue
-                return at
-        return None
+                    return at
+            require_clear(arm, pose, narrowest.opening_m, CLEARANCE_M)
+        return narrowest
 
     def _touch(
         self, candidates: tuple[Candidate, ...], chosen: Option, down: Squeezing | None

@@ -182,6 +182,18 @@ def test_a_candidate_that_is_gone_is_left_alone(make) -> None:
     assert not any(layer.stable for t in skill.touchsets for layer in t.layers)
 
 
+def test_the_record_says_what_keeps_closures_from_fitting(make, monkeypatch) -> None:
+    def require_clear(arm, pose, opening_m, margin_m=0.0) -> None:
+        raise MotionRefused("pose", "finger would hit candidate 0")
+
+    monkeypatch.setattr(module, "require_clear", require_clear)
+    b, skill = make(Oracle(right=1, enough=3))
+    assert repeat(b, skill) == 1
+    (note,) = (n["text"] for n in b.of_kind("note") if "candidate 1" in n["text"])
+    assert note.endswith("of the closures on candidate 1 do not fit: pose refused: finger would hit candidate 0")
+    assert len([key for key in skill.refused if key[0] == 1]) == int(note.split()[0])
+
+
 def test_fingers_on_something_cost_a_choice_not_the_mission(make, things) -> None:
     b, skill = make(Oracle(right=1, enough=3), stuff=[things.floor(0.045)], tip_P_m=0.022)
     repeat(b, skill)
