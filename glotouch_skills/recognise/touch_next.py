@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -29,6 +28,7 @@ from glotouch_skills.common.planning import (
     Squeezing,
     Stance,
     Standing,
+    beside,
     best_rates,
     disturbance,
     find_target,
@@ -248,7 +248,8 @@ class TouchNext(Skill):
                 self._refuse(option)
                 self._unfit.setdefault(option.closure.candidate, []).append(str(refusal))
                 continue
-            return replace(option, at=at, closure=replace(option.closure, gain_nats=float(gains[i][0])))
+            made = replace(option.closure, yaw_K_rad=at.yaw_K_rad, position_K_m=at.position_K_m)
+            return replace(option, at=at, closure=replace(made, gain_nats=float(gains[i][0])))
         return None
 
     def _tell_unfit(self) -> None:
@@ -263,27 +264,29 @@ class TouchNext(Skill):
         self.refused = (*self.refused, _key(option))
 
     def _fitting(self, belief: Belief, option: Option, down: Squeezing | None) -> Stance:
-        """Return the option's stance, opened as far as fits beside the neighbours.
+        """Return the option's stance, opened as far as fits beside the neighbours, or a stance close to it.
 
         Raises:
             MotionRefused: The hand does not fit.
         """
         if down is not None and option.at is down.at:
             return option.at
-        arm = self.context.arm
-        place = np.array([*option.at.position_K_m, option.closure.height_m])
-        pose = hand_pose_B(arm, self.context.world.container, place, option.at.yaw_K_rad)
-        others = neighbours((t.candidate for t in belief.touchsets), option.closure.candidate)
-        *wide, narrowest = (
-            option.at.opened(gap, arm.description.gripper) for gap in side_gaps_m(self.params.side_gap_m)
-        )
-        with keeping_clear_of(arm, others):
-            for at in wide:
-                with suppress(MotionRefused):
+        arm, closure = self.context.arm, option.closure
+        gripper, gaps_m = arm.description.gripper, side_gaps_m(self.params.side_gap_m)
+        (touchset,) = (t for t in belief.touchsets if t.candidate.index == closure.candidate)
+        opened = (option.at.opened(gap, gripper) for gap in gaps_m)
+        refusals = []
+        with keeping_clear_of(arm, neighbours((t.candidate for t in belief.touchsets), closure.candidate)):
+            for at in (*opened, *beside(touchset, option.at, gripper, gaps_m[-1])):
+                place = np.array([*at.position_K_m, closure.height_m])
+                pose = hand_pose_B(arm, self.context.world.container, place, at.yaw_K_rad)
+                try:
                     require_clear(arm, pose, at.opening_m, CLEARANCE_M)
-                    return at
-            require_clear(arm, pose, narrowest.opening_m, CLEARANCE_M)
-        return narrowest
+                except MotionRefused as refusal:
+                    refusals.append(refusal)
+                    continue
+                return at
+        raise refusals[0]
 
     def _touch(
         self, candidates: tuple[Candidate, ...], chosen: Option, down: Squeezing | None

@@ -31,4 +31,4 @@ from glotouch_skills.common.planning.squeeze_motion import (
 )
 from glotouch_skills.common.planning.squeeze_plan import Stance, all_sides, plan_stances, side_gaps_m
 from glotouch_skills.common.planning.target import TOO_LOW, SoughtObject, find_target
-from glotouch_skills.common.planning.touch_options import Option, Standing, best_rates, options
+from glotouch_skills.common.planning.touch_options import Option, Standing, beside, best_rates, options

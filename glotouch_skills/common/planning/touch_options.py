@@ -16,6 +16,10 @@ from glotouch_skills.common.planning.squeeze_plan import Stance, schemes, stance
 
 YAWS_RAD = np.deg2rad(np.arange(0.0, 180.0, 30.0))
 """Jaw yaws over a candidate without tracks; half a turn suffices for parallel jaws."""
+BESIDE_RAD = np.deg2rad([0.0, 10.0, -10.0])
+"""Turns from a stance that are tried where the hand does not fit. Source: ours; a third of the step of `YAWS_RAD`."""
+BESIDE_M = (0.0, 0.008, -0.008)
+"""Displacements along x_P that are tried with them. Source: ours; half the width of a pad."""
 SAME_M = 0.004
 """A closure within this distance of an earlier one gives no new information ..."""
 SAME_RAD = np.deg2rad(8.0)
@@ -71,6 +75,23 @@ def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> l
         places += [alternatives[0] for alternatives in tracks if abs(alternatives[0][0]) > SAME_M]
     found = (stance(candidate, along, yaw, side_gap_m, gripper) for along, yaw in places)
     return [s for s in found if s is not None]
+
+
+def beside(touchset: TouchSet, at: Stance, gripper: Gripper, side_gap_m: float) -> list[Stance]:
+    """Return the new stances close to `at`, for a hand that does not fit there: over the middle half of the candidate.
+
+    Args:
+        touchset: Touches of the candidate so far.
+        at: The stance.
+        gripper: The robot's gripper.
+        side_gap_m: Gap between open jaw and candidate on each side.
+    """
+    candidate, x = touchset.candidate, np.array([np.cos(at.yaw_K_rad), np.sin(at.yaw_K_rad)])
+    along = float((at.position_K_m - candidate.contour.centre_K_m) @ x)
+    quarter_m = 0.25 * float(np.ptp(candidate.span_m(at.yaw_K_rad)))
+    places = ((along + shift, float(at.yaw_K_rad + turn)) for turn in BESIDE_RAD for shift in BESIDE_M if turn or shift)
+    found = (stance(candidate, m, yaw, side_gap_m, gripper) for m, yaw in places if abs(m) <= quarter_m or m == along)
+    return [s for s in found if s is not None and not _used(touchset, s)]
 
 
 def options(
