@@ -248,6 +248,7 @@ class TouchNext(Skill):
                 self._refuse(option)
                 self._unfit.setdefault(option.closure.candidate, []).append(str(refusal))
                 continue
+            # The gain stays that of the option: a stance this close is expected to tell about the same.
             made = replace(option.closure, yaw_K_rad=at.yaw_K_rad, position_K_m=at.position_K_m)
             return replace(option, at=at, closure=replace(made, gain_nats=float(gains[i][0])))
         return None
@@ -255,7 +256,7 @@ class TouchNext(Skill):
     def _tell_unfit(self) -> None:
         """Note the closures that were found not to fit, and the most frequent cause for each candidate."""
         for index, causes in self._unfit.items():
-            ((cause, _),) = Counter(causes).most_common(1)
+            cause, _ = Counter(causes).most_common(1)[0]
             self.event("note", text=f"{len(causes)} of the closures on candidate {index} do not fit: {cause}")
         self._unfit.clear()
 

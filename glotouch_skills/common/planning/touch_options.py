@@ -78,7 +78,9 @@ def stances_over(candidate: Candidate, gripper: Gripper, side_gap_m: float) -> l
 
 
 def beside(touchset: TouchSet, at: Stance, gripper: Gripper, side_gap_m: float) -> list[Stance]:
-    """Return the new stances close to `at`, for a hand that does not fit there: over the middle half of the candidate.
+    """Return the stances close to `at` that were not used yet, to try where the hand does not fit at `at`.
+
+    A shifted stance stays over the middle half of the candidate, so that the jaws do not push it out sideways.
 
     Args:
         touchset: Touches of the candidate so far.
@@ -89,8 +91,9 @@ def beside(touchset: TouchSet, at: Stance, gripper: Gripper, side_gap_m: float) 
     candidate, x = touchset.candidate, np.array([np.cos(at.yaw_K_rad), np.sin(at.yaw_K_rad)])
     along = float((at.position_K_m - candidate.contour.centre_K_m) @ x)
     quarter_m = 0.25 * float(np.ptp(candidate.span_m(at.yaw_K_rad)))
-    places = ((along + shift, float(at.yaw_K_rad + turn)) for turn in BESIDE_RAD for shift in BESIDE_M if turn or shift)
-    found = (stance(candidate, m, yaw, side_gap_m, gripper) for m, yaw in places if abs(m) <= quarter_m or m == along)
+    shifts = [shift for shift in BESIDE_M if not shift or abs(along + shift) <= quarter_m]
+    places = [(along + shift, float(at.yaw_K_rad + turn)) for turn in BESIDE_RAD for shift in shifts]
+    found = (stance(candidate, along_m, yaw_rad, side_gap_m, gripper) for along_m, yaw_rad in places[1:])
     return [s for s in found if s is not None and not _used(touchset, s)]
 
 
