@@ -1,4 +1,4 @@
-"""Memory of the held tool: the space that it felt to be free, and its displacement in the hand.
+"""Memory of what was felt: free space, places where a fingertip came down on something, and the tool's displacement.
 
 The tool hangs straight down: its shaft stands above its ball. So where the ball passed without a contact, the column
 above is free at every height, except for what reaches in between the radii of shaft and ball. Objects are pushed by
@@ -24,18 +24,24 @@ CLEAR_OF_TOUCH_M = 0.015
 long. Source: `TraceParams.farthest_m`."""
 HANDLED_M = 0.10
 """Distance from closing jaws within which an object may have been moved. Source: ours."""
+SAME_PLACE_M = 0.004
+"""Two places of fingertips are the same within this distance. Source: ours; a fingertip's places are at most 7 mm
+apart."""
+COVERED_SHARE = 0.5
+"""A fingertip meets the same again if it covers this share of the places of one that met something. Source: ours."""
 MAX_DISPLACEMENT_M = 0.0015
 """Largest displacement to correct. Source: ours; the overlap of the simulated holder's rails with the handle. Beyond
 it, the handle has left its rails and is tilted."""
 
 
 class FeltSpace:
-    """Record of where the held tool was, and where it was touched; in K."""
+    """Record of where the held tool and the open fingers were, and where they were touched; in K."""
 
     def __init__(self) -> None:
         self._free_K_m: Array
         self._hand_K_m: Array
         self._touched_K_m: Array
+        self._met_K_m: list[Array]
         self.forget()
 
     def add(self, path_K_m: Array, touch_K_m: Array | None = None) -> None:
@@ -53,16 +59,42 @@ class FeltSpace:
         stood = np.column_stack([places_K_m, np.full(len(places_K_m), tips_K_m)])
         self._hand_K_m = np.concatenate([self._hand_K_m, stood])
 
+    def add_met(self, places_K_m: Array, tip_K_m: float) -> None:
+        """Record the places (n, 2) under a fingertip that came down on something, and the tip's height."""
+        self._met_K_m.append(np.column_stack([places_K_m, np.full(len(places_K_m), tip_K_m)]))
+
     def forget(self) -> None:
         """Remove everything: the objects may have been moved, or the tool was not held."""
         self._free_K_m, self._hand_K_m, self._touched_K_m = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2))
+        self._met_K_m = []
+
+    def forget_free_near(self, place_K_m: Array) -> None:
+        """Remove the free space that was felt within `HANDLED_M` of a place (2 or 3,): something stands in it."""
+        self._free_K_m, self._hand_K_m = (
+            felt[_away_m(felt, place_K_m) > HANDLED_M] for felt in (self._free_K_m, self._hand_K_m)
+        )
 
     def forget_near(self, place_K_m: Array) -> None:
         """Remove what was felt within `HANDLED_M` of a place (2 or 3,): the jaws move what they close on."""
-        place = np.asarray(place_K_m)[:2]
-        self._free_K_m, self._hand_K_m = (
-            felt[np.linalg.norm(felt[:, :2] - place, axis=1) > HANDLED_M] for felt in (self._free_K_m, self._hand_K_m)
-        )
+        self.forget_free_near(place_K_m)
+        self._met_K_m = [met for met in self._met_K_m if _away_m(met, place_K_m).min() > HANDLED_M]
+
+    def met_below(self, places_K_m: Array, tip_K_m: float) -> float | None:
+        """Return the height in K at which a fingertip that goes down to `tip_K_m` will meet what one met before.
+
+        None if it is not expected to: it covers less than `COVERED_SHARE` of where each earlier one came down.
+
+        Args:
+            places_K_m: (n, 2) places under the fingertip.
+            tip_K_m: Height to which it goes.
+        """
+        heights = [
+            float(met[0, 2])
+            for met in self._met_K_m
+            if met[0, 2] > tip_K_m
+            and np.mean([_away_m(places_K_m, place).min() <= SAME_PLACE_M for place in met]) >= COVERED_SHARE
+        ]
+        return max(heights, default=None)
 
     def columns(self, height_K_m: float) -> Array:
         """Return the places (n, 2) with a free column down to a height of the tool's reference point."""
@@ -88,6 +120,7 @@ class FeltSpace:
             "free_K_m": self._free_K_m.copy(),
             "hand_K_m": self._hand_K_m.copy(),
             "touched_K_m": self._touched_K_m.copy(),
+            "met_K_m": [met.copy() for met in self._met_K_m],
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -95,6 +128,12 @@ class FeltSpace:
         self._free_K_m = np.array(state["free_K_m"], dtype=np.float64).reshape(-1, 3)
         self._hand_K_m = np.array(state["hand_K_m"], dtype=np.float64).reshape(-1, 3)
         self._touched_K_m = np.array(state["touched_K_m"], dtype=np.float64).reshape(-1, 2)
+        self._met_K_m = [np.array(met, dtype=np.float64).reshape(-1, 3) for met in state["met_K_m"]]
+
+
+def _away_m(places_K_m: Array, place_K_m: Array) -> Array:
+    """Return the horizontal distances (n,) of places (n, 2 or 3) from one place (2 or 3,)."""
+    return np.asarray(np.linalg.norm(places_K_m[:, :2] - np.asarray(place_K_m)[:2], axis=1))
 
 
 class ToolSeat:

@@ -8,6 +8,7 @@ import numpy as np
 
 from glotouch_bt.perception import recognition
 from glotouch_bt.perception.recognition import PARTS, ProbeOption, ProbeTouch, excluded, next_probe_touch
+from glotouch_bt.perception.search import distinct
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD, Array
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
@@ -34,7 +35,8 @@ class NextProbe(Skill):
     """Choose the measurement that is expected to tell most per second about which candidate is the target.
 
     Repeat it, and make what it chose with `refine_outline` or `touch_top`, until `measured_enough`. A candidate that
-    the target's STL excludes already is not measured. Without a target all are, the least certain outline first.
+    the target's STL excludes already is not measured. Without a target all are, the least certain outline first. A
+    candidate that turned out to be the same body as another one is left out of `candidates`.
 
     SUCCESS: `candidate` and `next_part` are chosen, or `measured_enough` is true and `next_part` is empty.
     """
@@ -66,6 +68,7 @@ class NextProbe(Skill):
         yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
         new, before = self.measured, self.before or ()
         candidates = tuple(new if new is not None and new.index == c.index else c for c in self.known)
+        candidates = self._distinct(candidates)
         tried = {(t.candidate, t.part) for t in before}
         left = [ProbeTouch(c.index, part) for c in candidates for part in PARTS if (c.index, part) not in tried]
         self.postponed = 0
@@ -75,6 +78,14 @@ class NextProbe(Skill):
         self.next_part = "" if touch is None else touch.part
         self.probed = before if touch is None else (*before, touch)
         self.candidate = next(c for c in candidates if touch is None or c.index == touch.candidate)
+
+    def _distinct(self, candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+        """Return the candidates without those that turned out to be the same body as another one."""
+        felt = frozenset(t.candidate.index for t in self.felt or () if t.layers)
+        kept = distinct(candidates, felt)
+        for index in sorted({c.index for c in candidates} - {c.index for c in kept}):
+            self.event("note", text=f"candidate {index} is left out: it is the same body as another one")
+        return kept
 
     def _by_target(self, candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:
         gripper = self.context.arm.description.gripper

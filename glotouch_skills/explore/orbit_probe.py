@@ -110,10 +110,11 @@ class OrbitProbe(Skill):
             raise self.NOT_TRACED(
                 f"{len(traced.contacts)} contacts: no outline fits; {traced.ended}", contacts=len(traced.contacts)
             )
+        candidates = {c.index: c for c in admitted.candidates}
         for index in admitted.changed:
             self.event(
                 "candidate",
-                candidate=admitted.candidates[index],
+                candidate=candidates[index],
                 displaced_m=float(np.linalg.norm(traced.displaced_K_m)),
                 ended=traced.ended,
                 moves=traced.moves,

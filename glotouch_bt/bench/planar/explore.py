@@ -123,9 +123,10 @@ def explore(
             )
             admitted = drive(plan, execute)[0]
             belief, candidates = admitted.belief, admitted.candidates
-            for i in admitted.changed:
-                found[i] = Traced(world.travel_m, candidates[i])
-            found = {i: found[i] for i in range(len(candidates))}
+            found = {
+                c.index: Traced(world.travel_m, c) if c.index in admitted.changed else found[c.index]
+                for c in candidates
+            }
     except _OutOfBudget:
         ended = "budget"
     return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, tuple(maps))

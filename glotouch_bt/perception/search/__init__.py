@@ -1,5 +1,6 @@
 """Pure planners of tactile exploration: search for objects, outline tracing and height measurement."""
 
+from glotouch_bt.perception.search.bodies import distinct
 from glotouch_bt.perception.search.candidates import (
     HALF_QUALITY_SD_M,
     admit,

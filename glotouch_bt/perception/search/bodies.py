@@ -101,14 +101,37 @@ def count_doubtful(pairs: tuple[tuple[Candidate, Candidate], ...]) -> int:
     return len(body) - len(set(body.values()))
 
 
+def distinct(candidates: tuple[Candidate, ...], preferred: frozenset[int] = frozenset()) -> tuple[Candidate, ...]:
+    """Return the candidates without those that are the same body as another one.
+
+    Two candidates are the same body if the centre of each lies inside the other's envelope: bodies do not overlap so
+    far. The preferred one of them is kept, or else the one of the better quality.
+
+    Args:
+        candidates: All candidates.
+        preferred: Indices of candidates to keep.
+    """
+    kept: list[Candidate] = []
+    for candidate in sorted(candidates, key=lambda c: (c.index not in preferred, -c.quality, c.index)):
+        if not any(max(_depths_m(candidate, other)) < 0.0 for other in kept):
+            kept.append(candidate)
+    return tuple(c for c in candidates if any(c is k for k in kept))
+
+
+def _depths_m(a: Candidate, b: Candidate) -> tuple[float, float]:
+    """Return the signed distance of each centre from the other's envelope, negative inside."""
+    pairs = ((a, b), (b, a))
+    over, under = (float(signed_distance(envelope(one), other.contour.centre_K_m[None])[0]) for one, other in pairs)
+    return over, under
+
+
 def _may_be_one(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> bool:
     """Return True if two candidates stand close and may be one body, or one of them is hardly known."""
     if float(signed_distance(envelope(a), b.extent_K_m).min()) > BESIDE_M:
         return False
     if min(a.quality, b.quality) < KNOWN_QUALITY:
         return True
-    over = (signed_distance(envelope(one), other.contour.centre_K_m[None])[0] for one, other in ((a, b), (b, a)))
-    return min(over) < 0.0 or gain_of_two(a, b, radius_m, path_K_m) < CERTAIN_NATS
+    return min(_depths_m(a, b)) < 0.0 or gain_of_two(a, b, radius_m, path_K_m) < CERTAIN_NATS
 
 
 def gain_of_two(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> float:

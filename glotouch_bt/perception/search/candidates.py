@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import chain, count
 
 import numpy as np
 
@@ -99,21 +101,25 @@ def admit(
     if part_of is not None and traced.continued:
         better: Candidate | None = _with(part_of, traced.contacts, traced.outline)
     else:
-        better = next((m for m in (_merged(old, traced, radius, height_m) for old in known) if m is not None), None)
-    counted = better is not None
+        better = next(
+            (m for old in known if (m := _merged(old, traced, radius, height_m, belief.path_K_m)) is not None), None
+        )
     if better is None:
         outline = traced.outline
-        better = Candidate(len(known), outline.contour, height_m, quality(outline), traced.contacts, False)
+        better = Candidate(_next_index(known), outline.contour, height_m, quality(outline), traced.contacts, False)
     parts = bodies(better.contacts, radius, belief.path_K_m)
+    if len(parts) == 1 and max(better.contour.size_m) > MAX_LENGTH_M:
+        # Only one object can be here: keep the newest contacts; some of the earlier ones were another object's.
+        better, parts = _with(better, traced.contacts, traced.outline), (traced.contacts,)
     every = {c.index: c for c in known} | {better.index: better}
     changed: list[int] = []
     for body in parts:
-        index = len(every) if changed else better.index
+        index = _next_index(every.values()) if changed else better.index
         outline = outline_of(body, radius)
         every[index] = replace(better, index=index)
         if len(parts) > 1:
             every[index] = _with(every[index], body, outline)
-        belief = belief.with_exclusion(envelope(every[index]), exclusion_m, new=bool(changed) or not counted)
+        belief = belief.with_exclusion(envelope(every[index]), exclusion_m, index)
         changed.append(index)
     return _admitted(belief, every, radius, better.index, tuple(changed))
 
@@ -121,7 +127,7 @@ def admit(
 def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclusion_m: float) -> Admitted:
     """Divide the contacts of two candidates anew after a further trace of the second one.
 
-    If one body explains all of them, the second candidate is dropped, and the last one receives its index.
+    If one body explains all of them, the second candidate is dropped.
 
     Args:
         admitted: Map and candidates.
@@ -133,27 +139,25 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
     belief = admitted.belief.with_path(more.path_K_m).with_hints((*admitted.belief.hints, *outliers))
     if more.outline is None:
         return replace(admitted, belief=belief)
-    one, other = admitted.candidates[whole], admitted.candidates[part]
-    radius = more.outline.touches.radius_m
+    radius, every = more.outline.touches.radius_m, {c.index: c for c in admitted.candidates}
+    one, other = every[whole], every[part]
     parts = bodies((*one.contacts, *more.contacts), radius, belief.path_K_m)
-    every = {c.index: c for c in admitted.candidates}
     changed = tuple(dict.fromkeys((*admitted.changed, whole, part)))
     if len(parts) == 1:
-        belief, changed = belief.with_one_less(), tuple(i for i in changed if i != part)
+        belief, changed = belief.without_exclusion(part), tuple(i for i in changed if i != part)
         del every[part]
         parts = (split_at_motion(parts[0], radius, likely=len(one.contacts))[1],)
     mine = {id(c) for c in one.contacts}
     parts = tuple(sorted(parts, key=lambda body: -sum(id(c) in mine for c in body)))
-    indices = (whole, part, *range(len(admitted.candidates), len(admitted.candidates) + len(parts)))
-    for index, body in zip(indices, parts, strict=False):
+    for index, body in zip(chain((whole, part), count(_next_index(admitted.candidates))), parts, strict=False):
         every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius))
-        belief = belief.with_exclusion(envelope(every[index]), exclusion_m, new=index not in (whole, part))
+        belief = belief.with_exclusion(envelope(every[index]), exclusion_m, index)
         changed = tuple(dict.fromkeys((*changed, index)))
-    if len(every) < len(admitted.candidates) and part != len(every):
-        every[part] = replace(every.pop(len(every)), index=part)
-        changed = (*(i for i in changed if i != len(every)), part)
-        whole = part if whole == len(every) else whole
     return _admitted(belief, every, radius, whole, changed)
+
+
+def _next_index(candidates: Iterable[Candidate]) -> int:
+    return max((c.index for c in candidates), default=-1) + 1
 
 
 def _admitted(
@@ -238,22 +242,27 @@ def _is_fully_traced(candidate: Candidate) -> bool:
     return candidate.quality >= FULLY_TRACED_QUALITY and _is_well_traced(candidate)
 
 
-def _merged(old: Candidate, traced: OutlineTrace, radius_m: float, height_m: float) -> Candidate | None:
-    """Return the union of candidate and trace, or None if they are two objects."""
+def _merged(
+    old: Candidate, traced: OutlineTrace, radius_m: float, height_m: float, path_K_m: Array
+) -> Candidate | None:
+    """Return the union of candidate and trace, or None if the trace is of another object only.
+
+    Contacts that one body explains best if it moved are those after the motion. The union may still be several bodies.
+    """
     points = np.array([c.point_K_m for c in traced.contacts])
     if not _overlaps(old, points) and not (_is_fully_traced(old) and _is_over(old, traced)):
         return None
     shift = np.array([*traced.displaced_K_m, 0.0])
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
     everything = tuple(replace(c, pushed_K_m=np.zeros(2)) for c in (*before, *traced.contacts))
-    contacts = split_at_motion(everything, radius_m, likely=len(old.contacts))[1]
+    contacts = everything
+    if len(bodies(everything, radius_m, path_K_m)) == 1:
+        contacts = split_at_motion(everything, radius_m, likely=len(old.contacts))[1]
     outline = outline_of(contacts, radius_m)
     if max(outline.contour.size_m) > MAX_LENGTH_M:
         middle = points.mean(axis=0)[None]
         if float(signed_distance(envelope(old), middle)[0]) > 0.0:
             return None
-        # Only one object can be here: keep the newest contacts; some of the earlier ones were another object's.
-        contacts, outline = traced.contacts, outline_of(traced.contacts, radius_m)
     return _with(replace(old, height_m=max(old.height_m, height_m)), contacts, outline)
 
 

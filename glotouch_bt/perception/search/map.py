@@ -39,12 +39,22 @@ Mask = npt.NDArray[np.bool_]
 class Exclusion:
     """A region that the tip's centre avoids: a contour dilated by a margin (tip radius and clearance).
 
-    Compared by identity. `traced=False` marks an obstacle that is no traced object.
+    Compared by identity.
+
+    Attributes:
+        contour: The contour.
+        margin_m: The margin.
+        index: Index of the traced object; None: an obstacle that is no traced object.
     """
 
     contour: Contour
     margin_m: float
-    traced: bool = True
+    index: int | None = None
+
+    @property
+    def traced(self) -> bool:
+        """True for a traced object."""
+        return self.index is not None
 
     def clearance(self, points_K_m: Array) -> Array:
         """Return the distances (n,) of points (n, 2) from the envelope, negative inside."""
@@ -58,9 +68,8 @@ class SearchMap:
     Attributes:
         half_extent_m: (2,) limits of the tip's centre: |x| <= half[0], |y| <= half[1] in K.
         expected: Number of objects to find; None: unknown.
-        found: Number of traced objects.
         path_K_m: (n, 2) positions of the tip's centre at sensing height, every 2 mm, oldest first.
-        exclusions: Traced objects and obstacles.
+        exclusions: Traced objects, one exclusion each, and obstacles.
         dropped: (m, 2) positions given up: unreachable frontiers, contacts without an object.
         hints: Contacts with other objects during a trace; the search visits them first.
         left_below: With an unknown number, the chance that something is left below which the search is complete.
@@ -70,7 +79,6 @@ class SearchMap:
 
     half_extent_m: Array
     expected: int | None
-    found: int
     path_K_m: Array
     exclusions: tuple[Exclusion, ...]
     dropped: Array
@@ -101,7 +109,7 @@ class SearchMap:
             raise ParamError("left_below", left_below, "in [0, 1]")
         none = np.zeros((0, 2))
         none.setflags(write=False)
-        return cls(half, expected, 0, none, (), none, left_below=left_below, interior_m=interior_m)
+        return cls(half, expected, none, (), none, left_below=left_below, interior_m=interior_m)
 
     def with_path(self, points_K_m: npt.ArrayLike) -> SearchMap:
         """Add an executed, connected path (n, 2 or 3), resampled to 2 mm."""
@@ -119,16 +127,26 @@ class SearchMap:
             new = new[int(np.argmax(far)) :] if far.any() else new[:0]
         return replace(self, path_K_m=_frozen(np.concatenate([self.path_K_m, new])))
 
-    def with_exclusion(self, contour: Contour, margin_m: float, *, new: bool = True) -> SearchMap:
-        """Add a traced object; the tip's centre keeps `margin_m` from its outline.
+    def with_exclusion(self, contour: Contour, margin_m: float, index: int | None = None) -> SearchMap:
+        """Add a traced object, or replace the exclusion of a known one: where it no longer is may be searched again.
 
-        `new=False` updates an object that is already counted. Contacts outside the outline widen the margin, by 10 mm
-        at most.
+        Args:
+            contour: Its envelope. Contacts outside the outline widen the margin, by 10 mm at most.
+            margin_m: Distance that the tip's centre keeps from the envelope.
+            index: Index of the object; None: a new one.
         """
         if not (np.isfinite(margin_m) and margin_m >= 0):
             raise ParamError("margin_m", margin_m, "finite and not negative")
         out = float(np.clip(np.max(contour.residuals_m, initial=0.0), 0.0, MAX_PROTRUSION_M))
-        return replace(self, found=self.found + new, exclusions=(*self.exclusions, Exclusion(contour, margin_m + out)))
+        index = (
+            max((e.index for e in self.exclusions if e.index is not None), default=-1) + 1 if index is None else index
+        )
+        others = self.without_exclusion(index).exclusions
+        return replace(self, exclusions=(*others, Exclusion(contour, margin_m + out, index)))
+
+    def without_exclusion(self, index: int) -> SearchMap:
+        """Remove a traced object: it is a part of another one."""
+        return replace(self, exclusions=tuple(e for e in self.exclusions if e.index != index))
 
     def with_dropped(self, point_K_m: npt.ArrayLike) -> SearchMap:
         """Add a position (2,) that the search must not try again."""
@@ -141,11 +159,7 @@ class SearchMap:
             raise ParamError("radius_m", radius_m, "finite and positive")
         point = np.asarray(point_K_m, dtype=np.float64).ravel()[:2]
         disc = Contour("round", point, (2 * radius_m, 2 * radius_m), 0.0, 0.0, np.zeros(0))
-        return replace(self, exclusions=(*self.exclusions, Exclusion(disc, 0.0, traced=False)))
-
-    def with_one_less(self) -> SearchMap:
-        """Count one traced object less: it is a part of another one."""
-        return replace(self, found=self.found - 1)
+        return replace(self, exclusions=(*self.exclusions, Exclusion(disc, 0.0)))
 
     def with_doubtful(self, doubtful: int) -> SearchMap:
         """Set the number of traced objects that may be parts of other ones."""
@@ -195,6 +209,11 @@ class SearchMap:
         if len(self.path_K_m) == 0:
             return np.full(len(points), np.inf)
         return np.asarray(self._tree.query(points)[0], dtype=np.float64)
+
+    @property
+    def found(self) -> int:
+        """Number of traced objects."""
+        return sum(e.traced for e in self.exclusions)
 
     @property
     def half(self) -> tuple[float, float]:

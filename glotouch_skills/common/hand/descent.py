@@ -7,6 +7,7 @@ import numpy as np
 from glotouch_bt.motion import FREE_M_S, Arm, Motion, Paces
 from glotouch_bt.robot import Array, Pose
 from glotouch_bt.skill import Context
+from glotouch_skills.common.hand.fingertips import ALONG, fingertip_places, fingertips_K_m
 from glotouch_skills.common.hand.hand import glide
 
 BESIDE_M_S = 0.03
@@ -23,8 +24,6 @@ FELT_WITHIN_M = 0.010
 """The space below a finger was felt if the tool stood within this distance of every place on its inner edge. What
 reaches under the finger from the object would have been touched there. Source: ours; ball and shaft have radii of 6
 and 4 mm."""
-EDGE_PLACES = 5
-"""Number of places on each finger's inner edge."""
 
 
 def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, slow_m_s: float) -> Motion[bool]:
@@ -45,8 +44,7 @@ def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, sl
     """
     arm = context.arm
     edges = _inner_edges(arm, goal_B_P, opening_m)
-    at = arm.world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)
-    tips = float(at[2]) - arm.description.gripper.fingertip_below_P_m
+    tips = fingertips_K_m(arm, arm.pose_B_P)
     beside = max(tips - top_m - OVER_TOP_M, 0.0)
     paces: Paces = ((0.0, ABOVE_RATIO * slow_m_s), (beside, slow_m_s))
     free_m = arm.felt.free_down_to(edges, FELT_WITHIN_M)
@@ -56,21 +54,15 @@ def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, sl
     if reached:
         note_open_fingers(arm)
     else:
-        arm.felt.forget_near(at)
+        arm.felt.forget_free_near(edges.mean(axis=0))
     return reached
 
 
 def note_open_fingers(arm: Arm) -> None:
     """Record that the open fingers stand free where they are."""
-    at = arm.world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m)
-    tips = float(at[2]) - arm.description.gripper.fingertip_below_P_m
-    arm.felt.add_hand(_inner_edges(arm, arm.pose_B_P, arm.aperture_m), tips)
+    arm.felt.add_hand(_inner_edges(arm, arm.pose_B_P, arm.aperture_m), fingertips_K_m(arm, arm.pose_B_P))
 
 
 def _inner_edges(arm: Arm, goal_B_P: Pose, opening_m: float) -> Array:
     """Return places (n, 2) in K on the inner edges of both fingers at a pose."""
-    finger = arm.description.gripper.finger
-    x = finger.centre_m[0] + finger.half_m[0] * np.linspace(-1.0, 1.0, EDGE_PLACES)
-    edges_P = [np.column_stack([x, np.full_like(x, side * 0.5 * opening_m), 0.0 * x]) for side in (-1.0, 1.0)]
-    pose_K_P = arm.world.container.pose_B_K.inverse() @ goal_B_P
-    return np.asarray(pose_K_P.apply(np.concatenate(edges_P)))[:, :2]
+    return np.concatenate(fingertip_places(arm, goal_B_P, opening_m)[:, :ALONG])

@@ -10,6 +10,7 @@ from glotouch_bt.motion import Arm, Motion, Paces
 from glotouch_bt.perception.touch import ContactGuard, GuardParams, fit_baseline
 from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.skill import Context
+from glotouch_skills.common.hand.fingertips import fingertip_places, fingertips_K_m
 
 CLEARANCE_M = 0.004
 """Distance kept from neighbours: they may have been pushed a few millimetres since they were traced."""
@@ -29,12 +30,17 @@ def require_clear(arm: Arm, pose_B_P: Pose, aperture_m: float, margin_m: float |
     """Check that the open hand is clear of everything at a pose, before any motion towards it.
 
     Raises:
-        MotionRefused: Out of reach, or a part would collide; the pair is named.
+        MotionRefused: Out of reach, or a part would collide; the pair is named. Or a fingertip came down on something
+            there before.
     """
     q = arm.kinematics.ik(pose_B_P, arm.q)
     blocked = arm.scene.describe_violation(q, aperture_m, margin_m)
     if blocked is not None:
         raise MotionRefused("pose", blocked)
+    tips_m = fingertips_K_m(arm, pose_B_P)
+    for places in fingertip_places(arm, pose_B_P, aperture_m):
+        if (met_m := arm.felt.met_below(places, tips_m)) is not None:
+            raise MotionRefused("pose", f"a fingertip came down on something there, {met_m * 1e3:.0f} mm up")
 
 
 def glide(

@@ -18,7 +18,7 @@ from glotouch_bt.perception.touch import (
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose, TactileFrame
 from glotouch_bt.skill import Context, SkillParams, param
-from glotouch_skills.common.hand import close_compliantly, descend, glide, release
+from glotouch_skills.common.hand import close_compliantly, descend, fingertips_K_m, glide, release, rise_from_met
 from glotouch_skills.common.planning.squeeze_plan import Stance
 
 HAND_CLEARANCE_M = 0.005
@@ -128,14 +128,14 @@ class Squeezing:
         goal = self._pose(height_m)
         top_m, slow_m_s = self.candidate.height_m, p.descent_speed_m_s
         if not (yield from descend(self._context, goal, self.at.opening_m, top_m, slow_m_s)):
-            height = pads_height_m(self._context)
-            above_m = height + LEDGE_CLEARANCE_M
+            above_m = pads_height_m(self._context) + LEDGE_CLEARANCE_M
             highest_m = max(MAX_LEDGE_RATIO * top_m, min(LOW_M, top_m - p.top_overlap_m))
             if above_m <= highest_m:
                 yield from arm.line(self._pose(above_m), p.descent_speed_m_s, check=False)
                 return
-            yield from self.rise()
-            raise MotionRefused("squeeze", f"the fingers met something {height * 1e3:.0f} mm above the floor")
+            tips_mm = 1e3 * fingertips_K_m(arm, arm.pose_B_P)
+            yield from rise_from_met(arm, self.rise())
+            raise MotionRefused("squeeze", f"a fingertip came down on something {tips_mm:.0f} mm above the floor")
 
     def move_to(self, height_m: float) -> Motion[bool]:
         """Move up or down beside the object with open jaws; return False if the fingers touched something."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit
-from glotouch_bt.perception.search.bodies import bodies, count_doubtful, doubtful_pairs, outline_of
+from glotouch_bt.perception.search.bodies import bodies, count_doubtful, distinct, doubtful_pairs, outline_of
 from glotouch_bt.perception.search.candidates import quality, regroup
 from glotouch_bt.perception.touch import Candidate, Contact
 
@@ -87,7 +87,7 @@ def test_candidates_are_counted_once_in_a_chain_of_doubtful_pairs() -> None:
 
 
 def test_parts_that_turn_out_to_be_one_body_are_one_candidate() -> None:
-    """The last candidate receives the index that becomes free."""
+    """The others keep their indices."""
     far = candidate(2, disc(0.1, 0.1, 0.03, (0, 60, 120, 180, 240, 300)))
     parts = candidate(0, LEFT[:3]), candidate(1, LEFT[3:5])
     belief = SearchMap.blank((0.2, 0.15), expected=3)
@@ -96,10 +96,18 @@ def test_parts_that_turn_out_to_be_one_body_are_one_candidate() -> None:
     first = admit_nothing(belief, (*parts, far))
     traced = OutlineTrace(LEFT[3:], outline_of(LEFT[3:], R), np.zeros(2), NO_PATH)
     after = regroup(first, 0, 1, traced, 0.01)
-    assert [c.index for c in after.candidates] == [0, 1]
+    assert [c.index for c in after.candidates] == [0, 2]
     assert after.belief.found == 2
     assert after.candidates[0].contour.size_m == pytest.approx((0.06, 0.06), abs=2e-3)
     assert after.candidates[1].contour is far.contour
+
+
+def test_of_candidates_that_overlap_deeply_one_is_kept() -> None:
+    good, rough = candidate(0, LEFT), candidate(1, LEFT[:4])
+    beside = candidate(2, disc(0.06, 0.0, 0.03, (0, 60, 120, 180, 240, 300)))
+    assert max(good.quality, rough.quality) == good.quality
+    assert [c.index for c in distinct((rough, good, beside))] == [0, 2]
+    assert [c.index for c in distinct((rough, good, beside), frozenset({1}))] == [1, 2]
 
 
 def admit_nothing(belief: SearchMap, candidates: tuple[Candidate, ...]):

@@ -85,8 +85,8 @@ def ring(x, y, radius, degrees):
     )
 
 
-def disc_of_40_mm():
-    contacts = ring(0.0, 0.0, 0.02, np.arange(0.0, 360.0, 45.0))
+def disc_of_40_mm(first=0.0):
+    contacts = ring(0.0, 0.0, 0.02, np.arange(first, 360.0, 45.0))
     outline = outline_of(contacts, R)
     return Candidate(0, outline.contour, 0.018, quality(outline), contacts)
 
@@ -96,15 +96,40 @@ def disc_of_40_mm():
     [
         (ring(0.050, 0.0, 0.02, [180.0, 90.0, 0.0, 270.0]), 2),  # another disc, 10 mm beside it
         (ring(0.007, 0.0, 0.02, [0.0, 60.0, 300.0]), 1),  # the same, pushed by 7 mm
-        (ring(0.020, 0.0, 0.006, [90.0, 0.0, 270.0]), 1),  # a nose of 6 mm on its side
     ],
-    ids=["a neighbour", "pushed", "a part that stands out"],
+    ids=["a neighbour", "pushed"],
 )
 def test_what_lies_beside_an_outline_known_on_all_sides(contacts, objects):
     known = disc_of_40_mm()
     traced = OutlineTrace(contacts, outline_of(contacts, R), np.zeros(2), np.zeros((0, 2)))
     belief = SearchMap.blank((0.2, 0.15), expected=2).with_exclusion(known.contour, 0.01)
     assert len(admit(belief, (known,), contacts[0], traced, 0.018, 0.01).candidates) == objects
+
+
+def test_a_part_that_stands_out_costs_no_contact_and_is_checked():
+    """A nose of 6 mm on the side of a disc: one body with a limb, or two that touch."""
+    known, nose = disc_of_40_mm(45.0), ring(0.020, 0.0, 0.006, [90.0, 0.0, 270.0])
+    traced = OutlineTrace(nose, outline_of(nose, R), np.zeros(2), np.zeros((0, 2)))
+    belief = SearchMap.blank((0.2, 0.15), expected=3).with_exclusion(known.contour, 0.01)
+    admitted = admit(belief, (known,), nose[0], traced, 0.018, 0.01)
+    assert sum(len(c.contacts) for c in admitted.candidates) == len(known.contacts) + len(nose)
+    assert len(admitted.candidates) == 1 + len(admitted.doubtful)
+
+
+def test_a_trace_round_a_neighbour_keeps_the_contacts_of_the_candidate_that_it_merges_with():
+    """The first trace of a disc strayed onto a neighbour; a trace of the neighbour leaves both known."""
+    disc = ring(0.0, 0.0, 0.035, [200.0, 170.0, 140.0, 110.0, 80.0, 230.0, 260.0])
+    stray = ring(0.100, 0.0, 0.035, [180.0])
+    outline = outline_of((*disc, *stray), R)
+    mixed = Candidate(0, outline.contour, 0.018, quality(outline), (*disc, *stray))
+    belief = SearchMap.blank((0.2, 0.15), expected=5).with_exclusion(mixed.contour, 0.01)
+    neighbour = ring(0.100, 0.0, 0.035, [150.0, 100.0, 50.0, 0.0, 310.0])
+    traced = OutlineTrace(neighbour, outline_of(neighbour, R), np.zeros(2), np.zeros((0, 2)))
+    admitted = admit(belief, (mixed,), neighbour[0], traced, 0.018, 0.01)
+    nearest = min(float(np.linalg.norm(c.contour.centre_K_m - [0.1, 0.0])) for c in admitted.candidates)
+    assert nearest < 0.002
+    assert sum(len(c.contacts) for c in admitted.candidates) == len(mixed.contacts) + len(neighbour)
+    assert admitted.belief.found == len(admitted.belief.exclusions) == 2
 
 
 @pytest.mark.parametrize("gap", [0.016, 0.026])

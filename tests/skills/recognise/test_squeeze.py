@@ -93,7 +93,7 @@ def test_squeeze__no_squeeze__fingers_touch_and_rise_again(make, things) -> None
     b, skill = make(stuff=[things.floor(0.045)], tip_P_m=0.022)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_squeeze")
-    assert "met something" in skill.reason.message
+    assert "came down on something" in skill.reason.message
     assert float(b.arm.pose_B_P.position_m[2]) > -0.2 + 0.13
     assert b.robot.peak_force_N < 10.0
 
