@@ -6,7 +6,7 @@ exact distances from python-fcl for the remaining pairs. Frame B; obstacles are 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -39,7 +39,7 @@ _LEAVING_M = 2e-4
 
 @dataclass(frozen=True)
 class ClearanceViolation:
-    """First posture of a path with too little clearance.
+    """A posture with too little clearance of one part from one obstacle.
 
     Attributes:
         index: Index of the posture in the batch.
@@ -54,6 +54,11 @@ class ClearanceViolation:
     obstacle: str
     distance_m: float
     margin_m: float
+
+    @property
+    def for_space(self) -> bool:
+        """True if only space is lacking: the obstacle is a wall of the container or was added, as objects in it are."""
+        return self.obstacle in WALLS or self.obstacle not in OWN_OBSTACLES
 
     def __str__(self) -> str:
         thing = f"{self.obstacle} of the container" if self.obstacle in (*WALLS, "floor") else self.obstacle
@@ -231,10 +236,9 @@ class Scene:
 
     # -- queries -----------------------------------------------------------------------------------------------------
 
-    def describe_violation(self, q: Array, aperture_m: float, margin_m: float | None = None) -> str | None:
-        """Describe the clearance violation at `q` (dof,) rad with the jaws at `aperture_m`; None if clear."""
-        found = self.first_violation(np.asarray(q, dtype=np.float64)[None], aperture_m, margin_m)
-        return None if found is None else str(found)
+    def violations(self, q: Array, aperture_m: float, margin_m: float | None = None) -> list[ClearanceViolation]:
+        """Return every pair with too little clearance at `q` (dof,) rad, with the jaws at `aperture_m`."""
+        return list(self._violations(np.asarray(q, dtype=np.float64)[None], aperture_m, margin_m))
 
     def first_violation(self, q: Array, aperture_m: float, margin_m: float | None = None) -> ClearanceViolation | None:
         """Return the first clearance violation along postures (n, dof) rad, or None.
@@ -242,6 +246,10 @@ class Scene:
         A pair below the margin at the first posture may stay or part, but not come nearer. So a part can retract from a
         contact.
         """
+        return next(self._violations(q, aperture_m, margin_m), None)
+
+    def _violations(self, q: Array, aperture_m: float, margin_m: float | None) -> Iterator[ClearanceViolation]:
+        """Yield the violations of `first_violation`, all of them in the order of the postures."""
         margin = self.margin_m if margin_m is None else margin_m
         parts = [*self._arm_parts, *(self._tool_parts if self._holding else ())]
         obstacles = list(self._obstacles.values())
@@ -264,8 +272,7 @@ class Scene:
                     continue
                 if distance >= at_start.get((i, k), np.inf) - _LEAVING_M:
                     continue
-            return ClearanceViolation(n, parts[i].name, obstacles[k].name, float(distance), margin)
-        return None
+            yield ClearanceViolation(n, parts[i].name, obstacles[k].name, float(distance), margin)
 
     def _placed(self, parts: list[MovingPart], q: Array, aperture_m: float) -> tuple[Array, Array]:
         links = [self._kinematics.link_placements(row) for row in q]

@@ -23,6 +23,11 @@ def at(kinematics: Kinematics, x_K: float, y_K: float, z_K: float, yaw: float = 
     return kinematics.ik(Pose.pointing_down((0.6 + x_K, y_K, FLOOR_B + z_K), yaw), kinematics.home)
 
 
+def first(scene: Scene, q: np.ndarray, aperture_m: float, margin_m: float | None = None) -> str | None:
+    """Return the first violation at one posture in words."""
+    return next((str(v) for v in scene.violations(q, aperture_m, margin_m)), None)
+
+
 def distance_m(scene: Scene, part: str, obstacle: str, q: np.ndarray, aperture_m: float) -> float:
     """Signed distance of a part from an obstacle; negative is penetration."""
     body = {p.name: p for p in (*scene._arm_parts, *scene._tool_parts)}[part]
@@ -67,16 +72,16 @@ def test_links_are_where_the_description_says(scene: Scene, kinematics: Kinemati
 
 
 def test_violation_names_pair_and_penetration(scene: Scene, kinematics: Kinematics) -> None:
-    assert scene.describe_violation(kinematics.home, 0.05) is None
+    assert first(scene, kinematics.home, 0.05) is None
     # Its faces lie 0.20 and 0.214 along y, the wall's 0.200 and 0.208: 8 mm is the shortest way out.
     q = at(kinematics, 0.0, 0.18, 0.05)
-    assert scene.describe_violation(q, 0.04) == "left finger would hit wall +y of the container (penetration 8.0 mm)"
+    assert first(scene, q, 0.04) == "left finger would hit wall +y of the container (penetration 8.0 mm)"
     q = at(kinematics, 0.0, 0.2 - 0.02 - 0.014 - 0.001, 0.05)
-    assert scene.describe_violation(q, 0.04) == (
+    assert first(scene, q, 0.04) == (
         "left finger would pass wall +y of the container at 1.0 mm (margin 2.0 mm)"
     )
-    assert scene.describe_violation(q, 0.04, margin_m=0.0) is None
-    assert scene.describe_violation(q, 0.02) is None
+    assert first(scene, q, 0.04, margin_m=0.0) is None
+    assert first(scene, q, 0.02) is None
 
 
 def test_gripper_body_above_a_wall_is_checked(scene: Scene, kinematics: Kinematics) -> None:
@@ -86,22 +91,17 @@ def test_gripper_body_above_a_wall_is_checked(scene: Scene, kinematics: Kinemati
 
 
 def test_broad_phase_keeps_every_near_pair(scene: Scene, kinematics: Kinematics) -> None:
-    """Random postures: `describe_violation` is None exactly when every single distance is above the margin."""
+    """Random postures: `violations` has exactly the pairs whose single distances are below the margin."""
     scene.hold_tool(True)
     scene.add_obstacle("block", "box", centre_K_m=(0.05, 0.1), size_m=(0.06, 0.03), height_m=0.07, yaw_rad=0.6)
     rng = np.random.default_rng(3)
     blocked = 0
     for _ in range(60):
         q = at(kinematics, *rng.uniform((-0.14, -0.19, 0.10), (0.14, 0.19, 0.22)), np.pi + rng.uniform(-1, 1))
-        least = min(
-            distance_m(scene, p, o, q, 0.016)
-            for p in scene.parts
-            for o in scene.obstacles
-            if o not in ("probe", "table")
-        )
-        why = scene.describe_violation(q, 0.016)
-        assert (why is None) == (least >= scene.margin_m), f"{why} {least}"
-        blocked += why is not None
+        distances = {(p, o): distance_m(scene, p, o, q, 0.016) for p in scene.parts for o in scene.obstacles}
+        found = {(v.part, v.obstacle) for v in scene.violations(q, 0.016)}
+        assert found == {pair for pair, d in distances.items() if d < scene.margin_m}
+        blocked += bool(found)
     assert 5 < blocked < 55
 
 
@@ -109,9 +109,9 @@ def test_obstacles_are_added_and_removed(scene: Scene, kinematics: Kinematics) -
     q = at(kinematics, 0.0, 0.0, 0.05)
     scene.add_obstacle("can", "round", centre_K_m=(0.0, 0.05), size_m=(0.06, 0.06), height_m=0.06)
     assert distance_m(scene, "left finger", "can", q, 0.0) == pytest.approx(0.05 - 0.03 - 0.014, abs=2e-5)
-    assert "can" in str(scene.describe_violation(q, 0.085))
+    assert "can" in str(first(scene, q, 0.085))
     scene.remove_obstacle("can")
-    assert scene.describe_violation(q, 0.085) is None
+    assert first(scene, q, 0.085) is None
     scene.add_obstacle("a", "box", centre_K_m=(0.0, 0.0), size_m=(0.02, 0.02), height_m=0.04)
     scene.clear_obstacles()
     assert "a" not in scene.obstacles
@@ -121,24 +121,24 @@ def test_allow_applies_to_one_pair_only(scene: Scene, kinematics: Kinematics) ->
     scene.hold_tool(True)
     scene.add_obstacle("can", "round", centre_K_m=(0.0, 0.0), size_m=(0.05, 0.05), height_m=0.06)
     q = at(kinematics, 0.03, 0.0, 0.02 + TIP_BELOW_P)
-    assert str(scene.describe_violation(q, 0.016)).startswith("tip would hit can")
+    assert str(first(scene, q, 0.016)).startswith("tip would hit can")
     scene.allow("tip", "can")
     # The shaft stands 1 mm from the can: nearer than the margin, and not allowed.
-    assert str(scene.describe_violation(q, 0.016)).startswith("shaft would pass can")
+    assert str(first(scene, q, 0.016)).startswith("shaft would pass can")
     scene.allow("tool", "can")
-    assert scene.describe_violation(q, 0.016) is None
+    assert first(scene, q, 0.016) is None
     scene.disallow("tool", "can")
-    assert scene.describe_violation(q, 0.016) is not None
+    assert first(scene, q, 0.016) is not None
 
 
 def test_pickup_must_allow_the_probe_but_not_the_holder(scene: Scene, kinematics: Kinematics, world: World) -> None:
     q = kinematics.ik(world.holder.pose_B_grasp, kinematics.home)
-    assert scene.describe_violation(q, 0.05) is None
-    assert "probe" in str(scene.describe_violation(q, 0.015))
+    assert first(scene, q, 0.05) is None
+    assert "probe" in str(first(scene, q, 0.015))
     scene.hold_tool(True)
-    assert "holder" in str(scene.describe_violation(q, 0.016))
+    assert "holder" in str(first(scene, q, 0.016))
     scene.allow("tool", "holder")
-    assert scene.describe_violation(q, 0.016) is None
+    assert first(scene, q, 0.016) is None
 
 
 def test_part_may_retract_from_a_contact_but_not_come_nearer(scene: Scene, kinematics: Kinematics) -> None:

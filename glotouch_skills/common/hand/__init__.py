@@ -4,7 +4,7 @@ from glotouch_skills.common.hand.clearance_rules import keeping_clear_of, may_to
 from glotouch_skills.common.hand.compliant_close import close_compliantly, release
 from glotouch_skills.common.hand.descent import ABOVE_RATIO, OVER_TOP_M, descend
 from glotouch_skills.common.hand.fingertips import fingertips_K_m, rise_from_met
-from glotouch_skills.common.hand.hand import CLEARANCE_M, glide, require_clear
+from glotouch_skills.common.hand.hand import CLEARANCE_M, NoSpace, glide, require_clear
 from glotouch_skills.common.hand.line_guard import (
     DOWN_B,
     UP_B,

@@ -26,17 +26,23 @@ GLIDE_JERK_M_S3 = 20.0
 """Jerk limit of a guarded descent."""
 
 
+class NoSpace(MotionRefused):
+    """The open hand does not fit at a pose, and only because of candidates and walls: they can be moved apart."""
+
+
 def require_clear(arm: Arm, pose_B_P: Pose, aperture_m: float, margin_m: float | None = None) -> None:
     """Check that the open hand is clear of everything at a pose, before any motion towards it.
 
     Raises:
-        MotionRefused: Out of reach, or a part would collide; the pair is named. Or a fingertip came down on something
-            there before.
+        NoSpace: It would come too near to candidates or walls, and to nothing else; the first pair is named.
+        MotionRefused: Out of reach, or it would come too near to something else; the first pair is named. Or a
+            fingertip came down on something there before.
     """
     q = arm.kinematics.ik(pose_B_P, arm.q)
-    blocked = arm.scene.describe_violation(q, aperture_m, margin_m)
-    if blocked is not None:
-        raise MotionRefused("pose", blocked)
+    violations = arm.scene.violations(q, aperture_m, margin_m)
+    if violations:
+        refusal = NoSpace if all(v.for_space for v in violations) else MotionRefused
+        raise refusal("pose", str(violations[0]))
     tips_m = fingertips_K_m(arm, pose_B_P)
     for places in fingertip_places(arm, pose_B_P, aperture_m):
         if (met_m := arm.felt.met_below(places, tips_m)) is not None:

@@ -8,7 +8,7 @@ import pytest
 from glotouch_bt.motion import hand_pose_B, yaw_near_home
 from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_skills.common.hand.clearance_rules import keeping_clear_of
-from glotouch_skills.common.hand.hand import BUMP_N, glide, require_clear
+from glotouch_skills.common.hand.hand import BUMP_N, NoSpace, glide, require_clear
 
 
 @pytest.mark.parametrize("yaw", np.linspace(-7.0, 7.0, 29))
@@ -34,11 +34,23 @@ def test_no_room_is_said_with_the_pair(bench, found) -> None:
     require_clear(b.arm, pose, 0.06)
     with keeping_clear_of(b.arm, (found.round((0.0, 0.04), 0.02, index=3),)):
         assert "candidate 3" in b.arm.scene.obstacles
-        with pytest.raises(MotionRefused, match=r"finger would .* candidate 3"):
+        with pytest.raises(NoSpace, match=r"finger would .* candidate 3"):
             require_clear(b.arm, pose, 0.06)
     require_clear(b.arm, pose, 0.06)
     with pytest.raises(MotionRefused):
         require_clear(b.arm, Pose.pointing_down((3.0, 0.0, 0.0), 0.0), 0.06)
+
+
+def test_what_more_space_in_the_box_would_not_help_is_refused_otherwise(bench, found) -> None:
+    """Beside a wall or a neighbour only space is lacking; through the floor, nothing in the box need be moved."""
+    b = bench()
+    beside_wall, too_low = np.array([0.0, 0.165, 0.03]), np.array([0.0, 0.0, 0.005])
+    with pytest.raises(NoSpace, match="wall"):
+        require_clear(b.arm, hand_pose_B(b.arm, b.world.container, beside_wall, 0.0), 0.06)
+    with keeping_clear_of(b.arm, (found.round((0.0, 0.04), 0.02, index=3),)):
+        with pytest.raises(MotionRefused) as refused:
+            require_clear(b.arm, hand_pose_B(b.arm, b.world.container, too_low, 0.0), 0.06)
+    assert not isinstance(refused.value, NoSpace)
 
 
 def test_gliding_down_stops_on_what_stands_there(bench, things) -> None:
