@@ -77,9 +77,7 @@ def test_violation_names_pair_and_penetration(scene: Scene, kinematics: Kinemati
     q = at(kinematics, 0.0, 0.18, 0.05)
     assert first(scene, q, 0.04) == "left finger would hit wall +y of the container (penetration 8.0 mm)"
     q = at(kinematics, 0.0, 0.2 - 0.02 - 0.014 - 0.001, 0.05)
-    assert first(scene, q, 0.04) == (
-        "left finger would pass wall +y of the container at 1.0 mm (margin 2.0 mm)"
-    )
+    assert first(scene, q, 0.04) == ("left finger would pass wall +y of the container at 1.0 mm (margin 2.0 mm)")
     assert first(scene, q, 0.04, margin_m=0.0) is None
     assert first(scene, q, 0.02) is None
 

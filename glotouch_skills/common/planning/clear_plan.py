@@ -16,7 +16,9 @@ from glotouch_bt.perception.touch import Candidate, signed_distance
 from glotouch_bt.robot import Array, Gripper
 from glotouch_skills.common.hand import CLEARANCE_M
 from glotouch_skills.common.planning.finger_space import (
+    SIDE_GAP_M,
     Neighbour,
+    cramped_stances,
     finger_clearance_m,
     finger_space_m,
     gap_m,
@@ -103,38 +105,47 @@ class ClearPlanner:
     def for_space(self, target: Candidate) -> Iterator[Clearing | None]:
         """Yield the best plan so far that makes space for the fingers over an object; the last one is the answer.
 
-        Of the neighbours without which the fingers have `NEEDED_M`, or the most, the one that is carried least. None if
-        no neighbour gains `MIN_GAIN_M`, can be grasped, and has a free place. It yields often, because the computation
-        takes longer than a control period.
+        The space is made at a stance where they do not fit now. Of the neighbours without which the fingers have
+        `NEEDED_M`, or the most, the one that is carried least; or the object itself, if that is better. None if nothing
+        gains `MIN_GAIN_M`, can be grasped, and has a free place. It yields often, because the computation takes longer
+        than a control period.
         """
         outlines = {c.index: Neighbour.of(c) for c in self.candidates}
-        now = self._space(target, [n for i, n in outlines.items() if i != target.index])
+        around = [n for i, n in outlines.items() if i != target.index]
+        cramped = cramped_stances(target, [*around, *self.obstacles], self.half_extent_m, self.gripper)
+        if not cramped.any():
+            yield None
+            return
+        now = self._space(target, around, cramped)
         best: tuple[float, Clearing] | None = None
         for moving in self.candidates:
-            if moving.index == target.index or gap_m(outlines[moving.index], outlines[target.index]) > REACH_M:
-                continue
-            rest = [n for i, n in outlines.items() if i not in (target.index, moving.index)]
-            without = self._space(target, rest)
-            yield best[1] if best else None
-            if without < max(now + MIN_GAIN_M, 0.0):
-                continue
+            if moving.index != target.index:
+                if gap_m(outlines[moving.index], outlines[target.index]) > REACH_M:
+                    continue
+                without = self._space(target, [n for n in around if n.index != moving.index], cramped)
+                yield best[1] if best else None
+                if without < max(now + MIN_GAIN_M, 0.0):
+                    continue
             found: Clearing | None = None
-            for planned in self.take_out(moving, target):
+            for planned in self.take_out(moving, leave=False):
                 found = planned
                 yield best[1] if best else None
             if found is None:
                 continue
+            found = replace(found, space_m=self._space_after(target, moving, found.places[0], around, cramped))
+            if found.space_m < max(now + MIN_GAIN_M, 0.0):
+                continue
             cost = float(np.linalg.norm(found.places[0].shift_K_m)) + 100.0 * max(NEEDED_M - found.space_m, 0.0)
-            if found.space_m >= min(NEEDED_M, now + MIN_GAIN_M) and (best is None or cost < best[0]):
+            if best is None or cost < best[0]:
                 best = (cost, found)
         yield best[1] if best else None
 
-    def take_out(self, moving: Candidate, target: Candidate | None = None) -> Iterator[Clearing | None]:
+    def take_out(self, moving: Candidate, leave: bool = True) -> Iterator[Clearing | None]:
         """Yield None while it computes, then the plan to take an object out; None again if there is none.
 
         Args:
             moving: The object.
-            target: The object beside which the fingers need space; None: the object only has to leave its place.
+            leave: It has to leave its place entirely.
         """
         others = [Neighbour.of(c) for c in self.candidates if c.index != moving.index]
         grasp = outline_grasp(moving, others, self.half_extent_m, self.gripper)
@@ -144,24 +155,28 @@ class ClearPlanner:
         at = Stance(grasp.position_K_m[:2], grasp.yaw_rad, grasp.opening_m, grasp.aperture_m)
         for gap in GAPS_M:
             places: list[FreePlace] = []
-            for found in self._places(moving, at, gap, others, leave=target is None):
+            for found in self._places(moving, at, gap, others, leave):
                 if isinstance(found, FreePlace):
                     places.append(found)
                 yield None
                 if len(places) == MAX_PLACES:
                     break
             if places:
-                space = math.nan if target is None else self._space_after(target, moving, places[0], others)
-                yield Clearing(grasp, tuple(places), space)
+                yield Clearing(grasp, tuple(places))
                 return
         yield None
 
-    def _space(self, target: Candidate, neighbours: Sequence[Neighbour]) -> float:
-        return finger_space_m(target, [*neighbours, *self.obstacles], self.half_extent_m, self.gripper)
+    def _space(self, target: Candidate, neighbours: Sequence[Neighbour], at: Array) -> float:
+        return finger_space_m(target, [*neighbours, *self.obstacles], self.half_extent_m, self.gripper, at)
 
-    def _space_after(self, target: Candidate, moving: Candidate, place: FreePlace, others: list[Neighbour]) -> float:
+    def _space_after(
+        self, target: Candidate, moving: Candidate, place: FreePlace, around: list[Neighbour], at: Array
+    ) -> float:  # fmt: skip
+        """Return the clearance of the open fingers over an object after another one, or itself, was set down."""
+        if moving.index == target.index:  # the fingers may be on any side, so all of its gap counts
+            return place.gap_m - SIDE_GAP_M - 2.0 * float(self.gripper.finger.half_m[1])
         there = placed(Neighbour.of(moving), place)
-        return self._space(target, [*(n for n in others if n.index != target.index), there])
+        return self._space(target, [*(n for n in around if n.index != moving.index), there], at)
 
     def _places(
         self, moving: Candidate, at: Stance, gap: float, others: list[Neighbour], leave: bool

@@ -14,7 +14,8 @@ import numpy as np
 from glotouch_bt.perception.touch import Candidate, Contour, signed_distance
 from glotouch_bt.perception.touch.outline import envelope
 from glotouch_bt.robot import Array, Gripper
-from glotouch_skills.common.planning.squeeze_plan import Stance
+from glotouch_skills.common.hand import CLEARANCE_M
+from glotouch_skills.common.planning.squeeze_plan import Stance, side_gaps_m
 from glotouch_skills.common.planning.touch_options import stances_over
 
 SAMPLE_M = 0.003
@@ -139,16 +140,34 @@ def finger_clearance_m(at: Stance, neighbours: Sequence[Neighbour], half_extent_
     return min(clearance_m(finger, neighbours, half_extent_m) for finger in fingers(at, gripper))
 
 
-def finger_space_m(target: Candidate, neighbours: Sequence[Neighbour], half_extent_m: Array, gripper: Gripper) -> float:
+def finger_space_m(
+    target: Candidate, neighbours: Sequence[Neighbour], half_extent_m: Array, gripper: Gripper, at: Array | None = None
+) -> float:
     """Return the clearance of the open fingers over an object, at the stance where it is largest.
 
-    Minus infinity if the object does not fit between the jaws.
+    Minus infinity if there is no stance.
 
     Args:
         target: The object between the fingers.
         neighbours: The other objects.
         half_extent_m: (2,) half of the container's interior.
         gripper: The robot's gripper.
+        at: (n,) bool, the stances that count, as of `cramped_stances`; None: all.
     """
     stances = stances_over(target, gripper, SIDE_GAP_M)
-    return max((finger_clearance_m(at, neighbours, half_extent_m, gripper) for at in stances), default=-np.inf)
+    some = stances if at is None else [s for s, counts in zip(stances, at, strict=True) if counts]
+    return max((finger_clearance_m(s, neighbours, half_extent_m, gripper) for s in some), default=-np.inf)
+
+
+def cramped_stances(
+    target: Candidate, neighbours: Sequence[Neighbour], half_extent_m: Array, gripper: Gripper
+) -> Array:  # fmt: skip
+    """Return which stances (n,) over an object, bool, lack space for the fingers at each opening that is tried.
+
+    The stances move with the object, in the same order, if it is displaced. Arguments as of `finger_space_m`.
+    """
+    rated = [
+        [finger_clearance_m(at, neighbours, half_extent_m, gripper) for at in stances_over(target, gripper, gap_m)]
+        for gap_m in side_gaps_m(SIDE_GAP_M)
+    ]
+    return np.asarray(np.max(rated, axis=0) < CLEARANCE_M, dtype=bool)

@@ -20,6 +20,7 @@ from glotouch_skills.common.planning.finger_space import (
     Neighbour,
     Rectangle,
     clearance_m,
+    cramped_stances,
     finger_space_m,
     gap_m,
     sampled,
@@ -176,12 +177,17 @@ class PushPlanner:
     def for_space(self, target: Candidate) -> Iterator[Push | None]:
         """Yield the best push so far that makes space for the fingers over an object; the last one is the answer.
 
-        The shortest push that reaches `NEEDED_M`, of the object or of a neighbour; else the one with the largest gain;
-        None if nothing gains `MIN_GAIN_M`. It yields once for each object, because the computation takes long.
+        The space is made at a stance where they do not fit now. The shortest push that reaches `NEEDED_M`, of the
+        object or of a neighbour; else the one with the largest gain; None if nothing gains `MIN_GAIN_M`. It yields once
+        for each object, because the computation takes long.
         """
         outlines = {c.index: Neighbour.of(c) for c in self.candidates}
         around = [n for i, n in outlines.items() if i != target.index]
-        now = finger_space_m(target, around, self.half_extent_m, self.gripper)
+        cramped = cramped_stances(target, around, self.half_extent_m, self.gripper)
+        if not cramped.any():
+            yield None
+            return
+        now = finger_space_m(target, around, self.half_extent_m, self.gripper, cramped)
         best: tuple[float, Push] | None = None
         for moving in self.candidates:
             if moving.index != target.index and gap_m(outlines[moving.index], outlines[target.index]) > REACH_M:
@@ -191,7 +197,7 @@ class PushPlanner:
                     push = self.along(moving, yaw, distance)
                     if isinstance(push, str):
                         break
-                    push = replace(push, space_m=self._space_after(target, push, outlines))
+                    push = replace(push, space_m=self._space_after(target, push, outlines, cramped))
                     if push.space_m < max(now + MIN_GAIN_M, 0.0) and push.space_m < NEEDED_M:
                         continue
                     cost = _cost(push)
@@ -259,12 +265,12 @@ class PushPlanner:
             return "the fingers would meet something on the way"
         return ""
 
-    def _space_after(self, target: Candidate, push: Push, outlines: dict[int, Neighbour]) -> float:
+    def _space_after(self, target: Candidate, push: Push, outlines: dict[int, Neighbour], at: Array) -> float:
         shift = push.distance_m * push.along_K
         if push.candidate == target.index:
             target = displaced(target, shift)
         around = [n.moved(shift) if i == push.candidate else n for i, n in outlines.items() if i != target.index]
-        return finger_space_m(target, around, self.half_extent_m, self.gripper)
+        return finger_space_m(target, around, self.half_extent_m, self.gripper, at)
 
 
 def directions(candidate: Candidate) -> list[float]:

@@ -47,9 +47,9 @@ def test_what_more_space_in_the_box_would_not_help_is_refused_otherwise(bench, f
     beside_wall, too_low = np.array([0.0, 0.165, 0.03]), np.array([0.0, 0.0, 0.005])
     with pytest.raises(NoSpace, match="wall"):
         require_clear(b.arm, hand_pose_B(b.arm, b.world.container, beside_wall, 0.0), 0.06)
-    with keeping_clear_of(b.arm, (found.round((0.0, 0.04), 0.02, index=3),)):
-        with pytest.raises(MotionRefused) as refused:
-            require_clear(b.arm, hand_pose_B(b.arm, b.world.container, too_low, 0.0), 0.06)
+    beside = (found.round((0.0, 0.04), 0.02, index=3),)
+    with keeping_clear_of(b.arm, beside), pytest.raises(MotionRefused) as refused:
+        require_clear(b.arm, hand_pose_B(b.arm, b.world.container, too_low, 0.0), 0.06)
     assert not isinstance(refused.value, NoSpace)
 
 

@@ -11,6 +11,7 @@ from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.perception.touch import signed_distance
 from glotouch_skills.common.planning import NEEDED_M, Clearing, ClearPlanner, Neighbour, finger_space_m
 from glotouch_skills.common.planning.clear_plan import GAPS_M, GRID_M, FreePlace, free_gap_m, placed
+from glotouch_skills.common.planning.finger_space import cramped_stances
 from glotouch_skills.make_space.carried import Grip, after_carry
 
 GRIPPER = RIZON4_XENSE.gripper
@@ -116,3 +117,14 @@ def test_a_full_box_has_no_place(found) -> None:
 def test_nothing_is_taken_out_that_gains_nothing(found) -> None:
     things = (found.round((0.0, 0.0), 0.02, index=0), found.round((0.06, 0.14), 0.02, index=1))
     assert last(ClearPlanner(things, HALF, GRIPPER).for_space(things[0])) is None
+
+
+def test_an_object_is_taken_out_itself_where_only_a_wall_is_in_the_way(found) -> None:
+    """No neighbour is near, so none can be taken out; away from the wall, the fingers fit on every side."""
+    at_wall = found.box((0.0, 0.17), (0.06, 0.04))
+    clearing = last(ClearPlanner((at_wall,), HALF, GRIPPER).for_space(at_wall))
+    assert clearing is not None
+    assert clearing.grasp.candidate == 0
+    there = stands_at(clearing.places[0], at_wall)
+    assert finger_space_m(there, [], HALF, GRIPPER) >= clearing.space_m >= 0.0
+    assert not cramped_stances(there, [], HALF, GRIPPER).any()

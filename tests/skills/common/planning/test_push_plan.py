@@ -9,6 +9,7 @@ import pytest
 
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.motion import finger_outline_half_m
+from glotouch_skills.common.hand import CLEARANCE_M
 from glotouch_skills.common.planning import (
     NEEDED_M,
     Neighbour,
@@ -19,7 +20,8 @@ from glotouch_skills.common.planning import (
     finger_space_m,
     touched_edge_m,
 )
-from glotouch_skills.common.planning.finger_space import Rectangle, clearance_m, gap_m
+from glotouch_skills.common.planning.finger_space import Rectangle, clearance_m, cramped_stances, gap_m
+from glotouch_skills.common.planning.touch_options import stances_over
 
 GRIPPER = RIZON4_XENSE.gripper
 HALF = np.array([0.15, 0.20])
@@ -86,14 +88,32 @@ def test_a_push_makes_the_space_that_was_lacking(found) -> None:
     """Two boxes side by side: the fingers fit over the first once one of them was pushed away."""
     left, right = found.box((0.0, -0.021), (0.05, 0.04)), found.box((0.0, 0.021), (0.05, 0.04), index=1)
     tight = found.box((0.0, -0.07), (0.05, 0.04), index=2)
-    before = finger_space_m(left, [Neighbour.of(right), Neighbour.of(tight)], HALF, GRIPPER)
+    around = [Neighbour.of(right), Neighbour.of(tight)]
+    cramped = cramped_stances(left, around, HALF, GRIPPER)
+    assert finger_space_m(left, around, HALF, GRIPPER, cramped) < CLEARANCE_M <= NEEDED_M
     push = last(planner(left, right, tight).for_space(left))
     assert push is not None
-    assert push.space_m >= min(NEEDED_M, before)
+    assert push.space_m >= NEEDED_M
     moved = {c.index: c for c in (left, right, tight)}
     moved[push.candidate] = displaced(moved[push.candidate], push.distance_m * push.along_K)
     others = [Neighbour.of(c) for i, c in moved.items() if i != 0]
-    assert finger_space_m(moved[0], others, HALF, GRIPPER) == pytest.approx(push.space_m)
+    assert finger_space_m(moved[0], others, HALF, GRIPPER, cramped) == pytest.approx(push.space_m)
+
+
+@pytest.mark.parametrize(("off_mm", "fits"), [(22, False), (24, True)])
+def test_a_stance_lacks_space_if_even_the_narrowest_opening_does(found, off_mm: int, fits: bool) -> None:
+    """A box of 40 mm has a wall beside its long side: finger (14 mm), gap (5 mm) and clearance (4 mm) make 23 mm."""
+    at_wall = found.box((0.0, 0.2 - 0.02 - 1e-3 * off_mm), (0.06, 0.04))
+    cramped = cramped_stances(at_wall, [], HALF, GRIPPER)
+    along_wall = [abs(math.sin(at.yaw_K_rad)) < 1e-6 for at in stances_over(at_wall, GRIPPER, 0.01)]
+    assert any(along_wall)
+    assert cramped[along_wall].tolist() == [not fits] * sum(along_wall)
+
+
+def test_nothing_is_pushed_where_nothing_lacks_space(found) -> None:
+    free = found.box((0.0, 0.0), (0.06, 0.04))
+    assert not cramped_stances(free, [], HALF, GRIPPER).any()
+    assert last(planner(free).for_space(free)) is None
 
 
 def test_what_cannot_be_pushed_says_why(found) -> None:
