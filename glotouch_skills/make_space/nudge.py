@@ -118,7 +118,10 @@ class Nudge(Skill):
     )  # fmt: skip
     before = In(tuple, "pushes so far, as in the report", key="nudges", element=tuple, required=False, expected=False)
     candidates = Out(tuple, "all candidates, the pushed one where it stands now", element=Candidate, always=True)
-    cramped = Out(tuple, "none: what lacks space now is not known yet", element=int)
+    cramped = Out(
+        tuple, "none if the object was pushed or is not where it was traced: what lacks space now is not known",
+        element=int,
+    )  # fmt: skip
     touchsets = Out(tuple, "touches of objects that were not pushed", element=TouchSet, always=True)
     refused = Out(tuple, "closures that could not be made, of the other objects", always=True)
     doubtful = Out(tuple, "the same, with those that the object came close to", element=int, always=True)
@@ -140,6 +143,7 @@ class Nudge(Skill):
         self.refused = tuple(key for key in self.refused if key[0] not in (target.index, moving.index))
         if not felt.stopped and felt.resistance_N < MIN_FELT_N:
             self._doubt(moving.index)
+            self.cramped = ()
             self._tell(push, felt, "nothing resisted")
             raise self.NOTHING_PUSHED(
                 f"candidate {moving.index} was not met: {felt.resistance_N:.2f} N along {felt.pushed_m * 1e3:.0f} mm",
@@ -147,6 +151,7 @@ class Nudge(Skill):
             )
         if felt.left:
             self._doubt(moving.index)
+            self.cramped = ()
             self._tell(push, felt, "left")
             raise self.LEFT(f"candidate {moving.index} was no longer felt before the end of the push")
         moved = after_push(moving, push, felt.edge_m, self._half_m[1], felt.pushed_m)

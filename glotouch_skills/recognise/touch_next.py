@@ -8,34 +8,27 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion, hand_pose_B
+from glotouch_bt.motion import Motion
 from glotouch_bt.perception import recognition
 from glotouch_bt.perception.recognition import CHANGE_S, PARTS, ProbeTouch
 from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import HOLD, Array, MotionRefused
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Context, Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import (
-    CLEARANCE_M,
-    keeping_clear_of,
-    neighbours,
-    require_clear,
-)
+from glotouch_skills.common.hand import keeping_clear_of, neighbours
 from glotouch_skills.common.planning import (
     TOO_LOW,
     ClosureParams,
     Option,
     Squeezing,
-    Stance,
     Standing,
-    beside,
     best_rates,
     disturbance,
     find_target,
     options,
     pads_height_m,
-    side_gaps_m,
 )
+from glotouch_skills.recognise.closure_space import fitting_stance, lacking_space
 
 if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import Belief, TargetModel
@@ -68,7 +61,7 @@ class TouchNext(Skill):
     Repeat it until `decided`; then `match` says which candidate is the target.
 
     SUCCESS: one closure was tried, or `decided` is true and the hand is high: one candidate, or none, is the target
-    with the required confidence, or no closure would be informative.
+    with the required confidence, or no closure would be informative, or those that would be lack space.
     """
 
     Params = TouchNextParams
@@ -105,6 +98,10 @@ class TouchNext(Skill):
     doubtful = Out(
         tuple, "indices of candidates on which closures met something: not where they were traced", element=int
     )
+    cramped = Out(
+        tuple, "indices of candidates on which closures lack only space, most probable first", element=int, always=True
+    )
+    lacks_space = Out(bool, "`decided`, but closures on `cramped` would tell more if they had space", always=True)
     decided = Out(bool, "no further closure is needed")
 
     def __init__(self, name: str, params: SkillParams, context: Context) -> None:
@@ -129,6 +126,7 @@ class TouchNext(Skill):
 
     def run(self) -> SkillRun:
         """See the class."""
+        self.cramped, self.lacks_space = (), False
         candidates: tuple[Candidate, ...] = self.candidates
         wanted = [c for c in candidates if c.index not in (self.rejected or ())]
         if not wanted:
@@ -155,6 +153,9 @@ class TouchNext(Skill):
         why = recognition.enough(belief, self.params.confidence, self._hopeless)
         chosen = None if why else self._choose(belief, down)
         self._tell_unfit()
+        if chosen is None and not why:
+            self.cramped = self._lacking_space(belief)
+            self.lacks_space = bool(self.cramped)
         if chosen is not None and chosen.closure.candidate in self._unmeasured(belief):
             why = f"candidate {chosen.closure.candidate} would tell most, once the probe has measured it"
         if why or chosen is None:
@@ -243,7 +244,9 @@ class TouchNext(Skill):
             if _key(option) in self.refused:
                 continue
             try:
-                at = self._fitting(belief, option, down)
+                at = option.at
+                if down is None or at is not down.at:
+                    at = fitting_stance(self.context, belief, option, self.params.side_gap_m)
             except MotionRefused as refusal:
                 self._refuse(option)
                 self._unfit.setdefault(option.closure.candidate, []).append(str(refusal))
@@ -252,6 +255,16 @@ class TouchNext(Skill):
             made = replace(option.closure, yaw_K_rad=at.yaw_K_rad, position_K_m=at.position_K_m)
             return replace(option, at=at, closure=replace(made, gain_nats=float(gains[i][0])))
         return None
+
+    def _lacking_space(self, belief: Belief) -> tuple[int, ...]:
+        """Return the candidates for whose closures space should be made, most probable first."""
+        p, arm = self.params, self.context.arm
+        hand_K_m = (self.context.world.container.pose_B_K.inverse() @ arm.pose_B_P).position_m
+        found = options(belief.touchsets, None, hand_K_m, arm.description.gripper, p)
+        later = self._unmeasured(belief)
+        refused = [o for o in found if _key(o) in self.refused and o.closure.candidate not in later]
+        wanted = recognition.wanted(belief, p.confidence, self._hopeless) | recognition.hardly_felt(belief)
+        return lacking_space(self.context, belief, refused, p, p.min_gain_nats, wanted)
 
     def _tell_unfit(self) -> None:
         """Note the closures that were found not to fit, and the most frequent cause for each candidate."""
@@ -263,31 +276,6 @@ class TouchNext(Skill):
     def _refuse(self, option: Option) -> None:
         """Record that a closure could not be made, for this skill and for later ones."""
         self.refused = (*self.refused, _key(option))
-
-    def _fitting(self, belief: Belief, option: Option, down: Squeezing | None) -> Stance:
-        """Return the option's stance, opened as far as fits beside the neighbours, or a stance close to it.
-
-        Raises:
-            MotionRefused: The hand does not fit.
-        """
-        if down is not None and option.at is down.at:
-            return option.at
-        arm, closure = self.context.arm, option.closure
-        gripper, gaps_m = arm.description.gripper, side_gaps_m(self.params.side_gap_m)
-        (touchset,) = (t for t in belief.touchsets if t.candidate.index == closure.candidate)
-        opened = (option.at.opened(gap, gripper) for gap in gaps_m)
-        refusals = []
-        with keeping_clear_of(arm, neighbours((t.candidate for t in belief.touchsets), closure.candidate)):
-            for at in (*opened, *beside(touchset, option.at, gripper, gaps_m[-1])):
-                place = np.array([*at.position_K_m, closure.height_m])
-                pose = hand_pose_B(arm, self.context.world.container, place, at.yaw_K_rad)
-                try:
-                    require_clear(arm, pose, at.opening_m, CLEARANCE_M)
-                except MotionRefused as refusal:
-                    refusals.append(refusal)
-                    continue
-                return at
-        raise refusals[0]
 
     def _touch(
         self, candidates: tuple[Candidate, ...], chosen: Option, down: Squeezing | None
@@ -339,6 +327,7 @@ class TouchNext(Skill):
             closures=sum(len(t.layers) for t in belief.touchsets),
             stances=sum(len(t.sequences) for t in belief.touchsets),
             candidates=sum(bool(t.layers) for t in belief.touchsets),
+            cramped=self.cramped,
             ranking=belief.ranking,
         )
         self.decided = True

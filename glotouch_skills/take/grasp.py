@@ -13,6 +13,7 @@ from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.skill import UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import (
     CLEARANCE_M,
+    NoSpace,
     close_compliantly,
     descend,
     keeping_clear_of,
@@ -62,6 +63,11 @@ class Grasp(Skill):
         "closed on nothing; the hand has risen, jaws open",
         advice="the object or a neighbour was moved; squeeze it again",
     )
+    NO_SPACE = Failure(
+        "no_space",
+        "the open hand fits at no grasp of the plan beside the neighbours and the walls; nothing moved",
+        advice="make space with `nudge`, or with `clear_plan`, `grasp`, `lift` and `set_down`",
+    )
 
     plan = In(GraspPlan, "the planned grasps")
     known = In(tuple, "all candidates, to keep clear of", key="candidates", element=Candidate, required=False)
@@ -73,7 +79,9 @@ class Grasp(Skill):
     grip_m = Out(float, "aperture of the closed jaws, m")
     made = Out(GraspPlan, "the grasp that was made")
     tried = Out(tuple, "grasps made so far", element=GraspPlan)
-    graspable = Out(bool, "a grasp could be made", always=True)
+    graspable = Out(bool, "false: no grasp could be made though the hand fits; the object was moved", always=True)
+    cramped = Out(tuple, "index of the candidate if the hand fits at no grasp of it", element=int, always=True)
+    lacks_space = Out(bool, "the hand fits at no grasp of the plan", always=True)
     doubtful = Out(
         tuple, "the same, with a candidate of which no grasp could be made: it was moved", element=int, always=True
     )
@@ -84,8 +92,9 @@ class Grasp(Skill):
         others = neighbours(self.known or (), plan.candidate)
         made: tuple[GraspPlan, ...] = self.before or ()
         self.graspable, self.doubtful = True, self.doubtful_before or ()
+        self.cramped, self.lacks_space = (), False
         options = sorted((plan, *plan.alternatives), key=lambda option: any(_same(option, m) for m in made))
-        tried: list[str] = []
+        tried: list[MotionRefused] = []
         with keeping_clear_of(self.context.arm, others):
             for option in options:
                 try:
@@ -93,8 +102,13 @@ class Grasp(Skill):
                     self.made, self.tried = replace(option, closed_m=self.grip_m), (*made, option)
                     return
                 except MotionRefused as refusal:
-                    tried.append(str(refusal))
+                    tried.append(refusal)
                     self.event("note", text=f"a grasp was given up: {refusal}")
+        if all(isinstance(refusal, NoSpace) for refusal in tried):
+            self.cramped, self.lacks_space = (plan.candidate,), True
+            raise self.NO_SPACE(
+                f"the hand fits at none of {len(tried)} grasps; the last: {tried[-1]}", grasps=len(tried)
+            )
         self.graspable, self.doubtful = False, tuple(sorted({*self.doubtful, plan.candidate}))
         raise self.NO_GRASP(f"none of {len(tried)} grasps could be made; the last: {tried[-1]}", grasps=len(tried))
 

@@ -12,6 +12,7 @@ import trimesh
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
+import glotouch_skills.recognise.closure_space as closure_space
 import glotouch_skills.recognise.touch_next as module
 from glotouch_bt.perception.recognition import PARTS, Closure, Match, ProbeTouch, Ranking
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
@@ -108,7 +109,7 @@ def test_jaws_open_less_far_where_neighbours_leave_less_space(make, monkeypatch)
         if opening_m > WIDTH + 0.012:
             raise MotionRefused("pose", "a neighbour is near")
 
-    monkeypatch.setattr(module, "require_clear", require_clear)
+    monkeypatch.setattr(closure_space, "require_clear", require_clear)
     b, skill = make(Oracle(right=1, enough=3))
     b.run(skill)
     assert len(skill.touchsets[1].layers) == 1
@@ -191,7 +192,7 @@ def test_it_closes_beside_a_stance_where_the_hand_does_not_fit(make, monkeypatch
         if off_deg < 1.0:
             raise MotionRefused("pose", "a neighbour is near")
 
-    monkeypatch.setattr(module, "require_clear", require_clear)
+    monkeypatch.setattr(closure_space, "require_clear", require_clear)
     b, skill = make(Oracle(right=1, enough=1))
     repeat(b, skill)
     (sequence,) = skill.touchsets[1].sequences
@@ -205,7 +206,7 @@ def test_the_record_says_what_keeps_closures_from_fitting(make, monkeypatch) -> 
     def require_clear(arm, pose, opening_m, margin_m=0.0) -> None:
         raise MotionRefused("pose", "finger would hit candidate 0")
 
-    monkeypatch.setattr(module, "require_clear", require_clear)
+    monkeypatch.setattr(closure_space, "require_clear", require_clear)
     b, skill = make(Oracle(right=1, enough=3))
     assert repeat(b, skill) == 1
     (note,) = (n["text"] for n in b.of_kind("note") if "candidate 1" in n["text"])
