@@ -23,7 +23,7 @@ def test_it_goes_through_its_stages_in_order(retrieve: Run) -> None:
         "tool_check", "wrist_check", "guarded_sweep", "orbit_probe",
         "next_probe", "refine_outline", "next_probe", "touch_top", "next_probe", "tool_check 3", "tool_return",
         "wrist_check 3", "touch_next", "touch_next",
-        "match", "put_back", "wrist_check 13", "grasp", "lift", "hold_check", "object_check",
+        "match", "put_back 4", "wrist_check 19", "grasp 2", "lift 2", "hold_check 2", "object_check",
     ]  # fmt: skip
 
 
@@ -100,3 +100,54 @@ def test_a_hand_that_cannot_be_cleared_then_touches_nothing(retrieve: Run) -> No
     run = scheduled(retrieve, script | {last + "stow*": fails("object_held")}, 1)
     assert not run.succeeded
     assert not run.calls_of(last + "touch_next*")
+
+
+# --- space for the fingers -------------------------------------------------------------------------------------------
+
+CRAMPED = ok(decided=True, cramped=(0,), lacks_space=True)
+MAKE_SPACE = "*/recognise/*/make space/*"
+
+
+def test_where_closures_lack_space_a_push_makes_it_and_the_jaws_go_on(retrieve: Run) -> None:
+    script = {"match": REFUSED, "match 2": REFUSED, "match 5": ok(), "touch_next": CRAMPED, "touch_next 2": CRAMPED}
+    run = scheduled(retrieve, script | {"touch_next 4": DECIDED})
+    assert run.succeeded
+    assert skills(run, MAKE_SPACE) == ["stow", "wrist_check", "nudge", "wrist_check", "touch_next", "match"]
+    assert run.calls_of("nudge")[0].inputs["cramped_before"] == (0,)
+
+
+@each_code("nudge")
+def test_where_no_push_makes_space_one_is_lifted_out(retrieve: Run, code: str) -> None:
+    script = {"match": REFUSED, "match 2": REFUSED, "match 5": ok(), "touch_next": CRAMPED, "touch_next 2": CRAMPED}
+    run = scheduled(retrieve, script | {"touch_next 4": DECIDED, "nudge": fails(code)})
+    assert run.succeeded
+    assert skills(run, MAKE_SPACE)[2:9] == [
+        "nudge", "clear_plan", "put_back", "wrist_check", "grasp", "lift", "hold_check",
+    ]  # fmt: skip
+    assert run.before("set_down", "match 5")
+
+
+def test_where_nothing_lacks_space_nothing_is_moved(retrieve: Run) -> None:
+    run = scheduled(retrieve, {"match*": REFUSED, "touch_next*": ok(decided=True, cramped=(), lacks_space=False)})
+    assert safely(run, "not_recognised")
+    assert run.never_ran("nudge*")
+    assert run.never_ran("clear_plan*")
+
+
+def test_an_object_that_can_be_set_down_nowhere_ends_the_mission_in_the_hand(retrieve: Run) -> None:
+    """Neither a second attempt nor the search goes on with it: only `stow` starts, and keeps it."""
+    held = {"nudge": fails("no_push"), "set_down": fails("no_place"), "put_back 3": fails("in_the_way")}
+    script = {"match*": REFUSED, "touch_next*": CRAMPED, "stow*": fails("object_held")}
+    run = scheduled(retrieve, script | held | {"stow 8": [ok(), fails("object_held")]})
+    assert run.status == "failure"
+    assert (run.ran("nudge"), run.ran("put_back 3")) == (1, 1)
+    assert run.never_ran("search_anew 2")
+    assert {c.skill for c in run.calls[run.order.index("put_back 3") + 1 :]} == {"stow"}
+
+
+def test_where_the_hand_fits_at_no_grasp_space_is_made_and_the_target_is_recognised_again(retrieve: Run) -> None:
+    no_space = fails("no_space", graspable=True, cramped=(0,), lacks_space=True)
+    run = scheduled(retrieve, {"touch_next*": DECIDED, "grasp 2": [no_space] * 3 + [ok()]})
+    assert run.succeeded
+    assert (run.ran("nudge 2"), run.ran("match"), run.ran("grasp 2")) == (1, 2, 4)
+    assert run.never_ran("search_anew 2")

@@ -17,6 +17,7 @@ import glotouch_skills.recognise.touch_next as module
 from glotouch_bt.perception.recognition import PARTS, Closure, Match, ProbeTouch, Ranking
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.robot import MotionRefused
+from glotouch_skills.common.hand import NoSpace
 from glotouch_skills.recognise.touch_next import TouchNext
 
 WIDTH = 0.05
@@ -212,6 +213,34 @@ def test_the_record_says_what_keeps_closures_from_fitting(make, monkeypatch) -> 
     (note,) = (n["text"] for n in b.of_kind("note") if "candidate 1" in n["text"])
     assert note.endswith("of the closures on candidate 1 do not fit: pose refused: finger would hit candidate 0")
     assert len([key for key in skill.refused if key[0] == 1]) == int(note.split()[0])
+
+
+@pytest.mark.parametrize(("refusal", "cramped"), [(NoSpace, (1,)), (MotionRefused, ())])
+def test_it_says_which_candidate_lacks_space(make, monkeypatch, refusal: type[MotionRefused], cramped) -> None:
+    """Closures on candidate 1 would tell most and only lack space, or are out of reach: space would not help then."""
+
+    def require_clear(arm, pose, opening_m, margin_m=0.0) -> None:
+        if pose.position_m[1] > 0.0:
+            raise refusal("pose", "a neighbour is near")
+
+    monkeypatch.setattr(closure_space, "require_clear", require_clear)
+    oracle = Oracle(right=1, enough=3)
+    b, skill = make(oracle, min_gain_nats=0.3)
+    repeat(b, skill)
+    assert (skill.cramped, skill.lacks_space) == (cramped, bool(cramped))
+    assert b.of_kind("decided")[0]["cramped"] == cramped
+    _, later = make(oracle, min_gain_nats=0.3, felt=skill.touchsets, refused=skill.refused)
+    repeat(b, later)
+    assert later.cramped == cramped, "a later node tries the refused closures no more, but knows what they lack"
+    _, content = make(oracle, min_gain_nats=0.6, felt=skill.touchsets, refused=skill.refused)
+    repeat(b, content)
+    assert content.cramped == (), "closures that tell too little need no space"
+
+
+def test_nothing_lacks_space_when_it_is_known(make) -> None:
+    b, skill = make(Oracle(right=1, enough=3))
+    repeat(b, skill)
+    assert (skill.cramped, skill.lacks_space) == ((), False)
 
 
 def test_fingers_on_something_cost_a_choice_not_the_mission(make, things) -> None:

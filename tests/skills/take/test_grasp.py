@@ -71,12 +71,24 @@ def test_the_next_best_is_tried_when_there_is_no_room(make, found) -> None:
     assert not [o for o in b.arm.scene.obstacles if o.startswith("candidate")]
 
 
-def test_grasp__no_grasp__beside_the_wall_nothing_moves(make) -> None:
+def test_grasp__no_space__beside_the_wall_nothing_moves(make) -> None:
     b, skill = make(replace(PLAN, position_K_m=np.array([0.0, 0.17, 0.03])))
     b.run(skill)
-    assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_grasp")
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_space")
     assert "wall" in skill.reason.message
+    assert (skill.cramped, skill.lacks_space) == ((0,), True)
+    assert (skill.graspable, skill.doubtful) == (True, ()), "it was not moved: it need not be traced anew"
     assert not [c for c in b.commands if c.motion is not None]
+
+
+def test_grasp__no_grasp__one_of_the_grasps_was_tried(make) -> None:
+    """The hand fits at one grasp, where the jaws close on nothing: the object was moved, whatever the other lacks."""
+    tight = replace(PLAN, position_K_m=np.array([0.0, 0.17, 0.03]))
+    b, skill = make(replace(tight, alternatives=(PLAN,)), grip_width_m=None)
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_grasp")
+    assert (skill.cramped, skill.lacks_space) == ((), False)
+    assert (skill.graspable, skill.doubtful) == (False, (0,))
 
 
 def test_broken_off_anywhere(make, found, preempt_all_along) -> None:
