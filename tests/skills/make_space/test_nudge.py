@@ -91,7 +91,7 @@ def test_nudge__nothing_pushed__what_is_not_there_is_doubted(make) -> None:
     b, skill = make(force_N=0.0)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "nothing_pushed")
-    assert skill.doubtful == (0,)
+    assert (skill.doubtful, skill.cramped) == ((0,), ())
     np.testing.assert_allclose(skill.candidates[0].contour.centre_K_m, [0.0, 0.0])
 
 
@@ -123,7 +123,7 @@ def test_nudge__left__what_rolled_away_is_doubted(make) -> None:
     b, skill = make(left_from_m=EDGE_X_M + 0.015)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "left")
-    assert skill.doubtful == (0,)
+    assert (skill.doubtful, skill.cramped) == ((0,), ())
 
 
 def test_nudge__motion_refused__fingers_that_stand_on_a_foot_push_nothing(make) -> None:
