@@ -253,7 +253,7 @@ class TouchNext(Skill):
                 continue
             # The gain stays that of the option: a stance this close is expected to tell about the same.
             made = replace(option.closure, yaw_K_rad=at.yaw_K_rad, position_K_m=at.position_K_m)
-            return replace(option, at=at, closure=replace(made, gain_nats=float(gains[i][0])))
+            return replace(option, at=at, instead_of=option.at, closure=replace(made, gain_nats=float(gains[i][0])))
         return None
 
     def _lacking_space(self, belief: Belief) -> tuple[int, ...]:
@@ -348,8 +348,11 @@ def _state(candidate: Candidate) -> tuple[int, float, int]:
 
 
 def _key(option: Option) -> tuple[int, int, int, int]:
-    """Return the key of a refused option: candidate, yaw in degrees, height and place along x_P in mm."""
-    at = option.at
+    """Return the key of a refused option: candidate, yaw in degrees, height and place along x_P in mm.
+
+    It is that of the planned stance: otherwise the option would be tried at the stance close to it without end.
+    """
+    at = option.instead_of or option.at
     along = float(at.position_K_m @ [np.cos(at.yaw_K_rad), np.sin(at.yaw_K_rad)])
     c = option.closure
     return c.candidate, round(np.rad2deg(at.yaw_K_rad)), round(1e3 * c.height_m), round(1e3 * along)

@@ -42,6 +42,7 @@ class Option:
         seconds: Robot time from now until it is done.
         after: Closures that the same stance then allows, `more_s` each.
         more_s: Robot time of one of `after`.
+        instead_of: The planned stance if `at` is one close to it, where the hand fits; None: `at` is the planned one.
     """
 
     at: Stance
@@ -49,6 +50,7 @@ class Option:
     seconds: float
     after: tuple[Closure, ...] = ()
     more_s: float = CLOSURE_S
+    instead_of: Stance | None = None
 
 
 @dataclass(frozen=True)

@@ -215,6 +215,20 @@ def test_the_record_says_what_keeps_closures_from_fitting(make, monkeypatch) -> 
     assert len([key for key in skill.refused if key[0] == 1]) == int(note.split()[0])
 
 
+def test_a_stance_close_by_where_the_fingers_meet_something_is_not_tried_again(make, things, monkeypatch) -> None:
+    """The hand fits only beside the planned stances, and comes down on something there: each is tried once."""
+
+    def require_clear(arm, pose, opening_m, margin_m=0.0) -> None:
+        if np.rad2deg(abs(math.remainder(pose.yaw_rad, math.radians(30.0)))) < 1.0:
+            raise MotionRefused("pose", "a neighbour is near")
+
+    monkeypatch.setattr(closure_space, "require_clear", require_clear)
+    b, skill = make(Oracle(right=1, enough=3), stuff=[things.floor(0.045)], tip_P_m=0.022)
+    passes = repeat(b, skill, limit=20)
+    met = [n for n in b.of_kind("note") if "was not made" in n["text"]]
+    assert len(met) == len(set(skill.refused)) == passes - 1
+
+
 @pytest.mark.parametrize(("refusal", "cramped"), [(NoSpace, (1,)), (MotionRefused, ())])
 def test_it_says_which_candidate_lacks_space(make, monkeypatch, refusal: type[MotionRefused], cramped) -> None:
     """Closures on candidate 1 would tell most and only lack space, or are out of reach: space would not help then."""
