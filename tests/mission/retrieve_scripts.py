@@ -23,10 +23,12 @@ Run = Callable[..., ScriptedRun]
 
 @pytest.fixture
 def retrieve(scripted: Any) -> Run:
-    """Run `retrieve_fixed` with a script; all that is not scripted succeeds, and what is swept is one object."""
+    """Run `retrieve_fixed` with a script; all that is not scripted succeeds, and one object in free space is swept."""
 
     def run(script: dict[str, Any] | None = None, mission: str = "retrieve_fixed", **settings: Any) -> ScriptedRun:
-        done: ScriptedRun = scripted(mission, {"next_probe*": measures(), **(script or {})}, settings=settings)
+        done: ScriptedRun = scripted(
+            mission, {"next_probe*": measures(), "grasp*": ok(lacks_space=False), **(script or {})}, settings=settings
+        )
         return done
 
     return run
