@@ -27,7 +27,13 @@ def retrieve(scripted: Any) -> Run:
 
     def run(script: dict[str, Any] | None = None, mission: str = "retrieve_fixed", **settings: Any) -> ScriptedRun:
         done: ScriptedRun = scripted(
-            mission, {"next_probe*": measures(), "grasp*": ok(lacks_space=False), **(script or {})}, settings=settings
+            mission,
+            {
+                "next_probe*": measures(),
+                **{f"{skill}*": ok(lacks_space=False) for skill in ("touch_next", "grasp")},
+                **(script or {}),
+            },
+            settings=settings,
         )
         return done
 
