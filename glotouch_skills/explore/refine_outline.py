@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.perception.search import TraceParams, elsewhere_m, refined, trace_more
+from glotouch_bt.perception.search import TraceParams, lost_among, refined, trace_more
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
@@ -58,6 +58,7 @@ class RefineOutline(Skill):
     tool = In(HeldTool, "the held probe")
     candidate = In(Candidate, "the object as traced so far")
     anew = In(tuple, "indices of candidates whose contacts and top are given up", required=False, expected=False)
+    known = In(tuple, "all candidates", key="candidates", element=Candidate, required=False, expected=False)
     refined = Out(Candidate, "the object as traced now", key="candidate", always=True)
 
     def run(self) -> SkillRun:
@@ -65,6 +66,7 @@ class RefineOutline(Skill):
         p, tool, before = self.params, self.tool, self.candidate
         anew = before.index in (self.anew or ())
         self.refined = before
+        others = tuple(c for c in self.known or () if c.index != before.index)
         explorer = Explorer(self.context, tool, p.speeds(), self.event)
         half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - p.wall_gap_m
         plan = trace_more(
@@ -83,11 +85,10 @@ class RefineOutline(Skill):
             if traced.missing:
                 raise self.NOT_MET(f"candidate {before.index} was not met again where it had been traced")
             return
-        if off_m := elsewhere_m(before, better):
+        if lost_among(before, better, others):
             raise self.NOT_MET(
-                f"candidate {before.index} was lost among others: what was traced stands {off_m * 1e3:.0f} mm away",
+                f"candidate {before.index} was lost among others: what was traced is another one",
                 advice="it stands too near to them to be traced from the side",
-                off_m=off_m,
             )
         self.refined = replace(better, height_m=p.height_m, top_touched=False) if anew else better
         moved = float(np.linalg.norm(traced.displaced_K_m))

@@ -17,7 +17,7 @@ from glotouch_bt.perception.search import (
     MoveOutcome,
     SearchMap,
     SearchPolicy,
-    elsewhere_m,
+    lost_among,
     refined,
     seek,
     trace_bodies,
@@ -151,6 +151,7 @@ def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDG
             better = refined(traced.candidate, drive(more, execute))
         except _OutOfBudget:
             break
-        if better is not None and not elsewhere_m(traced.candidate, better):
+        others = tuple(t.candidate for j, t in enumerate(out) if j != i)
+        if better is not None and not lost_among(traced.candidate, better, others):
             out[i] = Traced(world.travel_m, better)
     return tuple(out)

@@ -4,8 +4,8 @@ from glotouch_bt.perception.search.bodies import distinct
 from glotouch_bt.perception.search.candidates import (
     HALF_QUALITY_SD_M,
     admit,
-    elsewhere_m,
     joins,
+    lost_among,
     of_another,
     part_of,
     refined,

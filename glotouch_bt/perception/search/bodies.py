@@ -104,8 +104,7 @@ def count_doubtful(pairs: tuple[tuple[Candidate, Candidate], ...]) -> int:
 def distinct(candidates: tuple[Candidate, ...], preferred: frozenset[int] = frozenset()) -> tuple[Candidate, ...]:
     """Return the candidates without those that are the same body as another one.
 
-    Two candidates are the same body if the centre of each lies inside the other's envelope: bodies do not overlap so
-    far. The preferred one of them is kept, or else the one of the better quality.
+    The preferred one of them is kept, or else the one of the better quality.
 
     Args:
         candidates: All candidates.
@@ -113,9 +112,14 @@ def distinct(candidates: tuple[Candidate, ...], preferred: frozenset[int] = froz
     """
     kept: list[Candidate] = []
     for candidate in sorted(candidates, key=lambda c: (c.index not in preferred, -c.quality, c.index)):
-        if not any(max(_depths_m(candidate, other)) < 0.0 for other in kept):
+        if not any(same_body(candidate, other) for other in kept):
             kept.append(candidate)
     return tuple(c for c in candidates if any(c is k for k in kept))
+
+
+def same_body(a: Candidate, b: Candidate) -> bool:
+    """Return True if the centre of each candidate lies inside the other's envelope: bodies do not overlap so far."""
+    return max(_depths_m(a, b)) < 0.0
 
 
 def _depths_m(a: Candidate, b: Candidate) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from itertools import chain, count
 
 import numpy as np
 
-from glotouch_bt.perception.search.bodies import bodies, count_doubtful, doubtful_pairs, outline_of
+from glotouch_bt.perception.search.bodies import bodies, count_doubtful, doubtful_pairs, outline_of, same_body
 from glotouch_bt.perception.search.map import FACING, SearchMap
 from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams
 from glotouch_bt.perception.touch import (
@@ -176,14 +176,17 @@ def refined(before: Candidate, traced: OutlineTrace) -> Candidate | None:
     return _with(before, traced.contacts, traced.outline)
 
 
-def elsewhere_m(before: Candidate, after: Candidate) -> float:
-    """Return the distance between two states of a candidate that cannot be the same object, m; else 0.
+def lost_among(before: Candidate, after: Candidate, others: tuple[Candidate, ...]) -> bool:
+    """Return True if a further trace has moved on from a candidate to a neighbour.
 
-    They are different if their enclosing circles do not meet: the trace has moved on to a neighbour.
+    Then the enclosing circles of its two states do not meet, or it has become the same body as another candidate, in
+    which it did not stand before.
     """
     apart = float(np.linalg.norm(after.contour.centre_K_m - before.contour.centre_K_m))
-    reach = 0.5 * (float(np.hypot(*before.contour.size_m)) + float(np.hypot(*after.contour.size_m)))
-    return apart if apart > reach else 0.0
+    if apart > 0.5 * (float(np.hypot(*before.contour.size_m)) + float(np.hypot(*after.contour.size_m))):
+        return True
+    middle = before.contour.centre_K_m[None]
+    return any(same_body(after, o) and float(signed_distance(envelope(o), middle)[0]) > 0.0 for o in others)
 
 
 def quality(outline: OutlineBelief) -> float:

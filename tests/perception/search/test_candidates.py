@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit, elsewhere_m, joins, part_of
+from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit, joins, lost_among, part_of
 from glotouch_bt.perception.search.bodies import outline_of
 from glotouch_bt.perception.search.candidates import quality
 from glotouch_bt.perception.touch import Candidate, Contact
@@ -165,5 +165,15 @@ def test_a_trace_that_ended_on_a_neighbour_is_not_the_candidate(candidate, away_
     box = dataclasses.replace(candidate.contour, size_m=np.array([0.09, 0.044]))
     before = dataclasses.replace(candidate, contour=box)
     there = dataclasses.replace(box, centre_K_m=box.centre_K_m + np.array([0.6, 0.8]) * away_m)
-    off = elsewhere_m(before, dataclasses.replace(before, contour=there))
-    assert off == (pytest.approx(abs(away_m)) if lost else 0.0)
+    assert lost_among(before, dataclasses.replace(before, contour=there), ()) == lost
+
+
+def test_a_trace_that_became_one_with_a_neighbour_is_not_the_candidate():
+    """A part inside the neighbour's envelope is another matter: it is the neighbour."""
+    neighbour = disc_of_40_mm()
+    strayed = dataclasses.replace(neighbour, index=1)
+    beside = outline_of(ring(0.045, 0.0, 0.02, [0.0, 90.0, 180.0, 270.0]), R).contour
+    assert lost_among(dataclasses.replace(strayed, contour=beside), strayed, (neighbour,))
+    assert not lost_among(dataclasses.replace(strayed, contour=beside), strayed, ())
+    part = outline_of(ring(0.010, 0.0, 0.01, [0.0, 90.0, 180.0, 270.0]), R).contour
+    assert not lost_among(dataclasses.replace(strayed, contour=part), strayed, (neighbour,))
