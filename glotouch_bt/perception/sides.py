@@ -28,7 +28,8 @@ BEARINGS, LEVELS, LEVEL_M = 72, 8, 0.015
 """Numbers of bearings and of levels, and height of a level, at which the points' reach is compared; the last level has
 no upper end."""
 ALIKE_M = 0.0015
-"""Maximum mean difference in reach of two sides that feel the same. Source: ours."""
+"""Maximum RMS difference in reach of two sides that feel the same. Source: ours. A truck on its wheels and on its roof
+differs by 1.9 mm, and is not recognised by the other side; an apple on sides of like tilt by 0.3 to 1.4 mm."""
 
 
 def model_with_sides(mesh: Mesh, pad: PadSpec, stance: str) -> TargetModel:
@@ -113,4 +114,4 @@ def _is_alike(a: Array, b: Array) -> bool:
     used = (a != 0).any(axis=0) | (b != 0).any(axis=0)
     bearing = np.arange(BEARINGS)
     turned = a[:, used][bearing - bearing[:, None]]  # by each number of bearings
-    return bool(np.abs(turned - b[:, used]).mean(axis=(1, 2)).min() < ALIKE_M)
+    return bool(np.sqrt(((turned - b[:, used]) ** 2).mean(axis=(1, 2))).min() < ALIKE_M)
