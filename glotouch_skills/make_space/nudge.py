@@ -139,6 +139,8 @@ class Nudge(Skill):
         except MotionRefused:
             self._doubt(moving.index)
             raise
+        for place in (moving.contour.centre_K_m, moving.contour.centre_K_m + felt.pushed_m * push.along_K):
+            self.context.arm.felt.forget_near(place)
         self.touchsets = tuple(t for t in self.touchsets if t.candidate.index != moving.index)
         self.refused = tuple(key for key in self.refused if key[0] not in (target.index, moving.index))
         if not felt.stopped and felt.resistance_N < MIN_FELT_N:

@@ -207,6 +207,8 @@ class SetDown(Skill):
         """Enter the object where it stands now, doubt what it may have moved, and report it."""
         moved = after_carry(moving, taken, released, self._pad_half_m)
         self.candidates = tuple(moved if c.index == moving.index else c for c in self.known)
+        for stood in (moving, moved):
+            self.context.arm.felt.forget_near(stood.contour.centre_K_m)
         self.touchsets = tuple(t for t in self.touchsets if t.candidate.index != moving.index)
         self.refused = ()
         stands = [Neighbour.of(moving), Neighbour.of(moved)]
