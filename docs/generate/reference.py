@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import missions
+import numpy as np
 import yaml
 from markdown_text import NOTE, code, codes, fields, prose, table
 from mcap.reader import make_reader
 from pydantic import BaseModel
 
+from glotouch_backends.rizon4 import XENSE_GRIPPER
 from glotouch_backends.robots import load_robot, shipped_robots
 from glotouch_bt.faults import CATALOGUE
 from glotouch_bt.mission.export import describe_nodes, describe_skill
@@ -22,7 +24,7 @@ from glotouch_bt.mission.read import SkillRegistry, WorldFile, shipped
 from glotouch_bt.mission.record import Recorder
 from glotouch_bt.mission.record.mcap_schemas import CHANNELS as CHANNELS_OF_RECORD
 from glotouch_bt.mission.spec import describe_findings
-from glotouch_bt.robot import HOLD, FakeRobot, RobotFile
+from glotouch_bt.robot import HOLD, FakeRobot, GelImages, RobotFile
 from glotouch_bt.robot.definition import LIMITS
 
 RECORD = """# The record of a run: run.mcap
@@ -60,6 +62,8 @@ TOPIC_NOTES = {
     "/packed/samples": "every force sample (1 kHz)",
     "/packed/cycles": "every control cycle; the first row precedes the first command",
     "/packed/tactile": "every pair of depth maps",
+    "/packed/images": "every pair of gel images, on request; pixels red, green, blue in 0..255",
+    "/packed/image_requests": "every cycle whose command requested gel images",
 }
 PACKED = """## Full-rate data: /packed/*
 
@@ -305,8 +309,11 @@ def record() -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.mcap"
         recorder = Recorder(path, {"mission": "none"})
-        for _ in range(50):
-            recorder.block(robot.cycle(command), command)
+        rows, columns = XENSE_GRIPPER.camera.shape if XENSE_GRIPPER.camera else (1, 1)
+        pixels = np.zeros((rows, columns, 3), dtype=np.uint8)
+        for k in range(50):
+            images = GelImages(0.01 * k, pixels, pixels) if k == 0 else None
+            recorder.block(replace(robot.cycle(command), images=images), replace(command, images=k == 0))
         recorder.close()
         layouts = {}
         with path.open("rb") as f:

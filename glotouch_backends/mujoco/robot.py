@@ -269,7 +269,7 @@ class MujocoRobot(Robot):
         last = rows[-1].tolist()
         jaws, speeds, forces = last[s.jaws], last[s.jaw_speeds], last[s.jaw_forces]
         self._aperture = jaws[0] + jaws[1]
-        self._tactile.sample(now_s, command.tactile, jaws, forces)
+        self._tactile.sample(now_s, command.tactile, jaws, forces, command.images)
         gripper = self._reports.report(
             now_s,
             self._aperture - self._tactile.shift_m,
@@ -285,6 +285,7 @@ class MujocoRobot(Robot):
             wrench_S=wrench - self._wrist.bias,
             gripper=gripper,
             tactile=self._tactile.arrived(now_s, command.tactile),
+            images=self._tactile.arrived_images(now_s),
         )
 
     def _note_peak(self) -> None:

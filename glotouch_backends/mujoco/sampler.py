@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,13 +13,15 @@ from glotouch_backends.mujoco.printed import Roughness
 from glotouch_backends.mujoco.sensing import (
     DepthErrors,
     GelSensor,
+    Side,
     SurfaceRays,
     TaxelErrors,
     gel_of_trial,
+    imager_of_trial,
     pad_pose_P,
 )
 from glotouch_backends.mujoco.truth import ObjectTruth, draw_truth, rotation_vector
-from glotouch_bt.robot import Array, Conditions, GripperState, Pose, RobotDescription, TactileFrame, World
+from glotouch_bt.robot import Array, Conditions, GelImages, GripperState, Pose, RobotDescription, TactileFrame, World
 from glotouch_bt.robot.scene import Mesh, stream
 from glotouch_bt.robot.simulation import Place, SampledClosure, TouchSampler
 
@@ -39,6 +41,31 @@ INSIDE_M = 0.002
 """The pads start this far inside the object's bounding sphere, so that its surface is in reach. Source: ours."""
 
 
+SIDES: tuple[Side, Side] = ("left", "right")
+
+
+@dataclass(frozen=True)
+class _Pressed:
+    """Both pads when they press an object; left, then right.
+
+    Attributes:
+        distance_m: (2,) distance of the pads from the hand's middle.
+        maps_m: (2, rows, cols) true indentation.
+        poses_O_pad, shift_m: Pose of each undeformed pad in the mesh frame at which its overlap was taken, and its
+            shift from there.
+    """
+
+    distance_m: Array
+    maps_m: Array
+    poses_O_pad: tuple[Pose, ...]
+    shift_m: tuple[float, ...]
+
+    @property
+    def width_m(self) -> float:
+        """Distance between the pads."""
+        return float(self.distance_m.sum())
+
+
 class MujocoTouchSampler(TouchSampler):
     """See `TouchSampler`.
 
@@ -50,7 +77,7 @@ class MujocoTouchSampler(TouchSampler):
         proof = AxisProof(conditions)
         truth = draw_truth(description, world, conditions, seed, proof)
         gripper = description.gripper
-        self._c, self._gripper = conditions, gripper
+        self._c, self.gripper = conditions, gripper
         self._objects = {o.mesh.name: o for o in truth.objects}
         self.names = tuple(self._objects)
         self._rays = {name: SurfaceRays(o.mesh, self._roughness(o, seed)) for name, o in self._objects.items()}
@@ -58,6 +85,8 @@ class MujocoTouchSampler(TouchSampler):
         self._depth = DepthErrors(conditions, seed, gripper.pad_window_m, gripper.pad_shape, proof)
         self._taxels = TaxelErrors(conditions, seed, gripper.pad_shape)
         open_ = GripperState(0.0, gripper.stroke_m, 0.0, False)
+        self._imager = imager_of_trial(gripper, conditions, seed, proof)
+        self._image_noise = stream(seed, "gel image noise")
         self._jaws = JawReports(conditions, seed, CLOSURE_S, open_, proof)
         self._force_gain, self._force_offset_N = force_errors(conditions, seed)
         # Compliance of the ball: lever squared over stiffness, across x_P and y_P.
@@ -89,9 +118,18 @@ class MujocoTouchSampler(TouchSampler):
     def untouched(self) -> TactileFrame:
         """See `TouchSampler`."""
         self._now_s += CLOSURE_S
-        return self._frame(np.zeros((2, *self._gripper.pad_shape)))
+        return self._frame(np.zeros((2, *self.gripper.pad_shape)))
 
-    def close(self, name: str, place: Place, hand: Place, height_m: float, force_N: float) -> SampledClosure | None:
+    def untouched_images(self) -> GelImages | None:
+        """See `TouchSampler`."""
+        if self._imager is None:
+            return None
+        flat = self._imager.flat()
+        return self._imager.images(self._now_s, flat, flat, self._image_noise)
+
+    def close(
+        self, name: str, place: Place, hand: Place, height_m: float, force_N: float, *, images: bool = False
+    ) -> SampledClosure | None:
         """See `TouchSampler`."""
         self._now_s += CLOSURE_S
         true_N = max(self._force_gain * force_N + self._force_offset_N, 0.1)
@@ -102,24 +140,32 @@ class MujocoTouchSampler(TouchSampler):
             for _ in range(ALIGN_STEPS):
                 turned = (place[0], place[1], place[2] + step)
                 tried = self._press(name, turned, hand, height_m, true_N)
-                if pressed is None or tried is None or tried[0].sum() >= pressed[0].sum() - 1e-5:
+                if pressed is None or tried is None or tried.width_m >= pressed.width_m - 1e-5:
                     break
                 place, pressed = turned, tried
-        if pressed is None or pressed[0].sum() > self._gripper.stroke_m:
+        if pressed is None or pressed.width_m > self.gripper.stroke_m:
             return None
-        distance_m, maps = pressed
+        distance_m = pressed.distance_m
         slide_m = 0.5 * float(distance_m[1] - distance_m[0])
         y_K = np.array([math.sin(hand[2]), -math.cos(hand[2])])
         moved = (place[0] + slide_m * y_K[0], place[1] + slide_m * y_K[1], place[2])
         late = math.ceil(self._c.gripper_latency_s / CLOSURE_S) + 1
         for _ in range(late + 1):
             state = self._jaws.report(self._now_s, float(distance_m.sum()), 0.0, true_N)
-        return SampledClosure(state.aperture_m, self._frame(maps), moved)
+        shown = self._images(pressed, name) if images else None
+        return SampledClosure(state.aperture_m, self._frame(pressed.maps_m), moved, shown)
 
-    def _press(
-        self, name: str, place: Place, hand: Place, height_m: float, force_N: float
-    ) -> tuple[Array, Array] | None:
-        """Return the (left, right) distances of the pads from the hand's middle, and the maps (2, rows, cols)."""
+    def _images(self, pressed: _Pressed, name: str) -> GelImages | None:
+        if self._imager is None:
+            return None
+        left, right = (
+            self._imager.indentation(side, [(self._rays[name], pose)], shift_m)
+            for side, pose, shift_m in zip(SIDES, pressed.poses_O_pad, pressed.shift_m, strict=True)
+        )
+        return self._imager.images(self._now_s, left, right, self._image_noise)
+
+    def _press(self, name: str, place: Place, hand: Place, height_m: float, force_N: float) -> _Pressed | None:
+        """Return the pads' state when they press the object, or None if a pad meets nothing."""
         rays, gel = self._rays[name], self._gel
         c, s = math.cos(hand[2]), math.sin(hand[2])
         down = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])  # columns x_P, y_P, z_P in K
@@ -127,16 +173,19 @@ class MujocoTouchSampler(TouchSampler):
         pose_K_O = Pose.planar([place[0], place[1], 0.0], place[2]) @ _standing(self._objects[name])
         pose_O_P = pose_K_O.inverse() @ pose_K_P
         middle_m = float(pose_O_P.inverse().apply(rays.centre_O_m)[1])
-        distances, maps = [], []
-        for side, sign in (("left", 1.0), ("right", -1.0)):
+        distances, maps, poses, shifts = [], [], [], []
+        for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             start_m = rays.radius_m + sign * middle_m - INSIDE_M
-            overlap = gel.overlap(side, [(rays, pose_O_P @ pad_pose_P(side, start_m))])  # type: ignore[arg-type]
+            pose_O_pad = pose_O_P @ pad_pose_P(side, start_m)
+            overlap = gel.overlap(side, [(rays, pose_O_pad)])
             if not np.isfinite(overlap.max()):
                 return None
             shift = gel.shift(overlap, force_N)
             distances.append(start_m - shift)
             maps.append(np.clip(overlap + shift, 0.0, gel.depth_m))
-        return np.array(distances), np.stack(maps)
+            poses.append(pose_O_pad)
+            shifts.append(shift)
+        return _Pressed(np.array(distances), np.stack(maps), tuple(poses), tuple(shifts))
 
     def _frame(self, maps: Array) -> TactileFrame:
         """Return the median of the frames on a plateau."""

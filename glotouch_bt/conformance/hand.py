@@ -78,3 +78,19 @@ class HandTests(Conformance):
                 assert depth.shape == shape
                 assert np.isnan(depth).mean() < 0.1
                 assert np.nanmax(np.abs(depth)) < 5e-4, "metres; nothing touches the pads"
+
+    def test_gel_images_arrive_once_a_request(self) -> None:
+        """A request brings one pair of images, of the declared shape and fresh; without a request, none comes."""
+        rig = self.rig()
+        camera = rig.robot.description.gripper.camera
+        if not self.pads or camera is None:
+            pytest.skip("this robot's pads take no images")
+        assert all(o.images is None for o in rig.hold(0.3, tactile=True)), "images arrived without a request"
+        asked = rig.cycle(Command(tactile=True, images=True))
+        pairs = [(o.now_s, o.images) for o in (asked, *rig.hold(FRAMES_S, tactile=True)) if o.images is not None]
+        assert len(pairs) == 1, f"{len(pairs)} pairs after one request"
+        for now, images in pairs:
+            assert 0.0 <= now - images.stamp_s + 1e-6 < 0.3, f"images {now - images.stamp_s:.3f} s old"
+            for image in (images.left, images.right):
+                assert image.shape == (*camera.shape, 3)
+                assert image.dtype == np.dtype(np.uint8)

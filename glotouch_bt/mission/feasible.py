@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from glotouch_bt.mission.load import Mission
-from glotouch_bt.mission.read import shipped_root
+from glotouch_bt.mission.read import needed_by, shipped_root
 from glotouch_bt.mission.spec import Finding, Findings, Place
 from glotouch_bt.motion import out_of_reach
 from glotouch_bt.perception import TooLow, model_for, too_wide, touched_name
-from glotouch_bt.robot import BadInput, Gripper, ObjectSet, load_backend
+from glotouch_bt.robot import BadInput, Gripper, ObjectSet, RobotDescription, load_backend
 from glotouch_bt.robot.scene import Mesh, draw_layout, load_folder, load_mesh
 
 SEED = 0
@@ -37,6 +37,8 @@ def check_feasible(mission: Mission, backend: str, options: Mapping[str, object]
     if description is not None:
         for fault in out_of_reach(description, mission.world):
             findings.add(Place(f"world {mission.world.name}"), "box_out_of_reach", f"{description.name}: {fault}")
+        for place, fault in missing_parts(mission, description):
+            findings.add(place, "missing_part", fault)
     if objects.folder.resolve() == (shipped_root() / "objects").resolve():
         return tuple(findings.sorted())
     meshes = load_folder(objects.folder, objects.names)
@@ -54,6 +56,19 @@ def check_feasible(mission: Mission, backend: str, options: Mapping[str, object]
         ):
             findings.add(Place(f"--set {name}"), "target_out_of_reach", fault)
     return tuple(findings.sorted())
+
+
+def missing_parts(mission: Mission, description: RobotDescription) -> list[tuple[Place, str]]:
+    """Return where a mission asks for an optional part of the gripper that the robot does not have, and which."""
+    found = []
+    for node in mission.spec.walk():
+        if node.params is None:
+            continue
+        for name, field in type(node.params).model_fields.items():
+            part = needed_by(field)
+            if part and getattr(node.params, name) and getattr(description.gripper, part) is None:
+                found.append((node.place, f"{name}: the gripper of {description.name} has no {part}"))
+    return found
 
 
 def _loaded(target: str, objects: ObjectSet) -> Mesh:

@@ -76,7 +76,7 @@ def target_model(mesh: Mesh, pad: PadSpec | None = None, folder: Path | None = N
         if model is None or not _is_of(model, mesh, pad):
             model = TargetModel.from_mesh(mesh, pad)
             _write(path, model)
-        _mapped[path] = model
+        _mapped[path] = replace(model, mesh=mesh)
     while len(_mapped) > MAX_MAPPED:
         _mapped.popitem(last=False)
     model = _mapped[path]

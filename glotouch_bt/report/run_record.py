@@ -41,7 +41,7 @@ TREE_TOPICS = "/tree/"
 RECORD_NAME, RESULT_NAME, TRUTH_NAME, FILM_NAME = "run.mcap", "result.json", "truth.json", "film.json"
 ALL_TOPICS = (EVENT_PREFIX, "/packed/", TREE_TOPICS)
 """Beginnings of the topics that a reader needs for everything that a record holds; the others are drawings of it."""
-_PACKED = {"/packed/samples": "samples", "/packed/cycles": "cycles", "/packed/tactile": "tactile"}
+_PACKED = {f"/packed/{name}": name for name in ("samples", "cycles", "tactile", "images", "image_requests")}
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,8 @@ class RunRecord:
         samples: Full-rate columns (N, ...): stamp_s, q, dq, position_B_P, quat_B_P, force_S_N, torque_S_Nm.
         cycles: Once a control cycle: stamp_s, samples, gripper_*, command_* (NaN where there was no command).
         tactile: stamp_s and arrived_s (f,), left_m and right_m (f, rows, cols).
+        images: stamp_s and arrived_s (k,), left and right (k, rows, cols, 3): the gel images; empty without any.
+        image_requests: stamp_s (r,), the cycles whose command requested gel images; empty without any.
         events, ticks, ports: In the order of the record.
         complete: The record was closed properly.
         film: Rendered moments (film.json) as they are, or None.
@@ -97,6 +99,8 @@ class RunRecord:
     samples: dict[str, Array] = field(default_factory=dict)
     cycles: dict[str, Array] = field(default_factory=dict)
     tactile: dict[str, Array] = field(default_factory=dict)
+    images: dict[str, Array] = field(default_factory=dict)
+    image_requests: dict[str, Array] = field(default_factory=dict)
     events: list[RecordedEvent] = field(default_factory=list)
     ticks: list[Tick] = field(default_factory=list)
     ports: list[PortWrite] = field(default_factory=list)
@@ -174,7 +178,8 @@ def read_run(path: str | Path) -> RunRecord:
     with RecordReader(path) as reader:
         reader.read()
         record = reader.record
-        record.samples, record.cycles, record.tactile = (join(reader.packed[n]) for n in _PACKED.values())
+        for name, parts in reader.packed.items():
+            setattr(record, name, join(parts))
     folder = record.path.parent
     result = _json_file(folder / RESULT_NAME)
     record.result = result if isinstance(result, dict) and result else record.result
@@ -192,8 +197,8 @@ class RecordReader:
 
     Attributes:
         record: What was read: description, events, ticks and ports. Its arrays are left empty.
-        packed: The parts of the arrays, by the names of `RunRecord` (samples, cycles, tactile), in the order of the
-            file. The caller may take parts out.
+        packed: The parts of the arrays, by the names of `RunRecord` (samples, cycles, tactile, images,
+            image_requests), in the order of the file. The caller may take parts out.
 
     Raises:
         BadInput: There is no record, or the folder holds links.

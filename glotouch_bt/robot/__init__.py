@@ -28,7 +28,7 @@ from glotouch_bt.robot.command import (
     Ticket,
 )
 from glotouch_bt.robot.definition import RobotFile, read_robot
-from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription
+from glotouch_bt.robot.description import Box, Capsule, GelCamera, Gripper, Joint, Link, RobotDescription
 from glotouch_bt.robot.fake import FakeRobot
 from glotouch_bt.robot.geometry import (
     Array,
@@ -42,6 +42,6 @@ from glotouch_bt.robot.geometry import (
 )
 from glotouch_bt.robot.interface import Backend, Picture, Robot, Snapshot
 from glotouch_bt.robot.limits import Limits
-from glotouch_bt.robot.observation import SAMPLED, GripperState, Observation, TactileFrame
+from glotouch_bt.robot.observation import SAMPLED, GelImages, GripperState, ImageArray, Observation, TactileFrame
 from glotouch_bt.robot.registry import backend_entry_points, load_backend
 from glotouch_bt.robot.scene import Conditions, Container, Holder, ObjectSet, Probe, World

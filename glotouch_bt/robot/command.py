@@ -52,11 +52,14 @@ class Command:
         motion: A joint setpoint, or None to hold the last setpoint at rest.
         gripper: A new gripper target, or None to keep the last one.
         tactile: Request depth maps; they cost computing time, so request them only while squeezing.
+        images: Request ONE pair of gel images, taken at the next frame of the sensors. It arrives once, periods later.
+            Only a gripper with a `GelCamera` takes them; another robot ignores the request.
     """
 
     motion: JointSetpoint | None = None
     gripper: GripperTarget | None = None
     tactile: bool = False
+    images: bool = False
 
 
 HOLD = Command()

@@ -10,9 +10,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_bt.errors import ParamError
 from glotouch_bt.robot.geometry import Array, Pose, cross_matrix, rpy_to_matrix
 
 Vec3 = tuple[float, float, float]
+MIN_LIGHT_VOLUME = 0.05
+"""Least volume spanned by the directions of a gel's three lights; below it a surface's slope does not follow from its
+colour. Source: ours; lights 120 deg apart span 0.8 at an elevation of 20 deg and 0.08 at 80 deg."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +86,31 @@ class Box:
 
 
 @dataclass(frozen=True, kw_only=True)
+class GelCamera:
+    """The camera behind each gel: colour images of the gel's surface, lit by a red, a green and a blue light.
+
+    Attributes:
+        shape: (rows, cols) of an image, laid out as a depth map.
+        lights: Unit directions towards the red, the green and the blue light, each (along the columns, along the rows,
+            out of the object into the gel), in the LEFT image. Both sensors are mounted alike, so the lights of the
+            right image are mirrored along its columns.
+    """
+
+    shape: tuple[int, int]
+    lights: tuple[Vec3, Vec3, Vec3]
+
+    def __post_init__(self) -> None:
+        if min(self.shape) < 1:
+            raise ParamError("camera.shape", self.shape, "positive")
+        if not abs(float(np.linalg.det(np.array(self.lights)))) > MIN_LIGHT_VOLUME:
+            raise ParamError("camera.lights", self.lights, "three directions that span the space")
+
+    def directions(self, *, right: bool) -> Array:
+        """Return the light directions (3, 3) of one pad's image, one row a light."""
+        return np.array(self.lights) * [-1.0 if right else 1.0, 1.0, 1.0]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Gripper:
     """A parallel gripper with a gel pad on each finger. Frame P as in `observation`.
 
@@ -96,6 +125,7 @@ class Gripper:
         pad_window_m: (width along x_P, length along z_P) of the gel.
         pad_shape: (rows, cols) of the depth map.
         pad_depth_m: Largest indentation the gel can show.
+        camera: Camera behind each gel, or None if the pads give depth maps only.
     """
 
     pose_E_P: Pose
@@ -110,6 +140,7 @@ class Gripper:
     pad_window_m: tuple[float, float]
     pad_shape: tuple[int, int]
     pad_depth_m: float
+    camera: GelCamera | None = None
 
     def mass_and_com_E(self) -> tuple[float, Array]:
         """Return mass kg and centre of mass (3,) in E of the body with both fingers."""
@@ -117,6 +148,17 @@ class Gripper:
         centre = self.pose_E_P.apply((x, 0.0, z))
         mass = self.mass_kg + fingers
         return mass, (self.mass_kg * np.asarray(self.com_E_m) + fingers * centre) / mass
+
+    @property
+    def image_pitch_m(self) -> tuple[float, float]:
+        """Distance of two pixels of a gel image (along its rows' axis z_P, along x_P).
+
+        Raises:
+            ParamError: The gripper has no camera.
+        """
+        if self.camera is None:
+            raise ParamError("gripper.camera", None, "a gripper whose pads give images")
+        return self.pad_window_m[1] / self.camera.shape[0], self.pad_window_m[0] / self.camera.shape[1]
 
     @property
     def fingertip_below_P_m(self) -> float:

@@ -10,8 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from glotouch_bt.robot.geometry import Array, Pose
 
+ImageArray = npt.NDArray[np.uint8]
 SAMPLED = ("stamp_s", "q", "dq", "position_B_P", "quat_B_P", "wrench_S")
 """Fields of an `Observation` with one row a sample."""
 
@@ -52,6 +56,23 @@ class TactileFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class GelImages:
+    """One pair of colour images of the gels' surfaces taken together, laid out as a `TactileFrame`.
+
+    The pixel pitch follows from the shape and the gel window (`Gripper.image_pitch_m`).
+
+    Attributes:
+        stamp_s: Robot clock when the images were taken.
+        left: (rows, cols, 3) uint8 red, green, blue of the pad at +y_P.
+        right: The same of the pad at -y_P.
+    """
+
+    stamp_s: float
+    left: ImageArray
+    right: ImageArray
+
+
+@dataclass(frozen=True, slots=True)
 class Observation:
     """All samples of one control period, oldest first (n = 10 at 1 kHz sensing and 100 Hz control).
 
@@ -65,6 +86,7 @@ class Observation:
             origin, minus the last tare. Pressing a down-pointing tool onto the floor gives +z_B force.
         gripper: Last report of the jaws.
         tactile: A NEW pair of depth maps, if one arrived this period and was requested; else None.
+        images: The pair of gel images that an earlier command requested, in the period in which it arrives; else None.
     """
 
     stamp_s: Array
@@ -75,6 +97,7 @@ class Observation:
     wrench_S: Array
     gripper: GripperState
     tactile: TactileFrame | None = None
+    images: GelImages | None = None
 
     @property
     def now_s(self) -> float:

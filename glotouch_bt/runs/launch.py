@@ -17,7 +17,7 @@ from typing import Any
 
 from glotouch_bt.faults import FaultInjector, FaultPlan, ListeningRecord, injector_in, read_plan, wrong_models
 from glotouch_bt.lazy import load_all
-from glotouch_bt.mission import Mission, load_mission, split_settings
+from glotouch_bt.mission import Mission, load_mission, missing_parts, split_settings
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, CheckpointWriter, ResumePoint
 from glotouch_bt.mission.execution import Control, Outcome, SkillHung, deferred_interrupt, run_mission
 from glotouch_bt.mission.read import load_conditions
@@ -89,7 +89,7 @@ def launch(
                 mission = _mission(request, **models)
             known = backend.describe(options)
             if known is not None:  # before a real arm is enabled
-                _require_reach(known, mission)
+                _require_suited(known, mission)
             try:
                 robot = backend.open(mission.world, conditions, request.seed, options)
             except UnknownName as e:
@@ -105,7 +105,7 @@ def launch(
                 if resumable is not None:
                     require_same_robot(folder.path, resumable.file.run, robot.description)
                 if known is None:
-                    _require_reach(robot.description, mission)
+                    _require_suited(robot.description, mission)
                 if world is not None:
                     robot.restore(world)
                 if plan is not None:
@@ -131,7 +131,10 @@ def launch(
             return _run(run, on_progress, control)
 
 
-def _require_reach(description: RobotDescription, mission: Mission) -> None:
+def _require_suited(description: RobotDescription, mission: Mission) -> None:
+    if missing := missing_parts(mission, description):
+        listed = "\n".join(f"{place}: {fault}" for place, fault in missing)
+        raise BadInput(f"{listed}\nset it to false, or use a robot that has it")
     if faults := out_of_reach(description, mission.world):
         listed = "\n".join(f"{description.name} cannot reach {fault}" for fault in faults)
         raise BadInput(f"{listed}\nmove it in the world file, or use an arm that reaches farther")

@@ -231,7 +231,10 @@ def _same_record(a: RunRecord, b: RunRecord) -> bool:
     """Return True for equal samples (to the bit), ticks, ports and events."""
     arrays = all(
         mine.keys() == theirs.keys() and all(mine[k].tobytes() == theirs[k].tobytes() for k in mine)
-        for mine, theirs in ((a.samples, b.samples), (a.cycles, b.cycles), (a.tactile, b.tactile))
+        for mine, theirs in (
+            (getattr(a, name), getattr(b, name))
+            for name in ("samples", "cycles", "tactile", "images", "image_requests")
+        )
     )
     told = [(json.dumps([vars(e) for e in x.events]), x.ticks, x.ports) for x in (a, b)]
     return arrays and told[0] == told[1]

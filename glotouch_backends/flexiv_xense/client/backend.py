@@ -136,6 +136,7 @@ class FlexivXenseBackend(Backend):
                 force_N=hand.force_N,
                 pad_shape=hand.pad_shape,
                 pad_depth_m=hand.pad_depth_m,
+                image_shape=None if hand.camera is None else hand.camera.shape,
             ),
             posture=self.description.home_q,
             period_s=PERIOD_S,

@@ -15,6 +15,7 @@ from glotouch_backends.flexiv_xense.driver import messages
 from glotouch_bt.robot import (
     BackendError,
     Command,
+    GelImages,
     GlotouchError,
     GripperState,
     JointSetpoint,
@@ -85,9 +86,10 @@ class FlexivXenseRobot(Robot):
         jaws = None if g is None else messages.JawTarget(float(g.aperture_m), float(g.speed_m_s), float(g.force_N))
         number, began = self.link.number(), time.monotonic()
         try:
-            block = self.link.ask(
-                messages.Cycle(number=number, setpoint=setpoint, jaws=jaws, tactile=command.tactile), messages.Block
+            cycle = messages.Cycle(
+                number=number, setpoint=setpoint, jaws=jaws, tactile=command.tactile, images=command.images
             )
+            block = self.link.ask(cycle, messages.Block)
         except BackendError as e:
             self._failed = e
             for ticket in self._tickets.values():
@@ -181,6 +183,7 @@ class FlexivXenseRobot(Robot):
             wrench_S=rows[:, 21:27],
             gripper=GripperState(j.stamp_s, j.aperture_m, j.force_N, j.moving),
             tactile=None if block.maps is None else _frame(block.maps),
+            images=None if block.images is None else _images(block.images),
         )
 
 
@@ -188,3 +191,9 @@ def _frame(maps: messages.Maps) -> TactileFrame:
     shape = (maps.rows, maps.columns)
     left, right = (np.frombuffer(body, dtype="<f8").reshape(shape) for body in (maps.left, maps.right))
     return TactileFrame(maps.stamp_s, left, right)
+
+
+def _images(images: messages.Images) -> GelImages:
+    shape = (images.rows, images.columns, 3)
+    left, right = (np.frombuffer(body, dtype=np.uint8).reshape(shape) for body in (images.left, images.right))
+    return GelImages(images.stamp_s, left, right)

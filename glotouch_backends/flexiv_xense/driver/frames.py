@@ -7,7 +7,7 @@ Flexiv: "world" is the arm's base B. The TCP is P, as registered with the tool. 
 TCP and written in the TCP frame about its origin; it has our sign: a tool pressed on a table feels +z of the world.
 Quaternions are w x y z in both.
 
-Xense: millimetres, mm/s, N; depth maps in millimetres, positive when the gel is indented.
+Xense: millimetres, mm/s, N; depth maps in millimetres, positive when the gel is indented; images blue, green, red.
 """
 
 from __future__ import annotations
@@ -96,3 +96,20 @@ def depth_map_m(depth_mm: npt.ArrayLike, shape: tuple[int, int], mirrored: bool)
         good = np.isfinite(cell)
         mean[i, j] = cell[good].mean(dtype=np.float64) if good.any() else np.nan
     return MM * mean
+
+
+def gel_image(rectified: npt.ArrayLike, shape: tuple[int, int], mirrored: bool) -> npt.NDArray[np.uint8]:
+    """Return a gel image (rows, columns, 3), red, green, blue: each pixel is the mean of a cell of the vendor's image.
+
+    Args:
+        rectified: (h, w, 3) uint8 blue, green, red, rows from the flange to the fingertip.
+        shape: (rows, columns), not larger than (h, w).
+        mirrored: True if its columns run along -x_P.
+    """
+    image = np.asarray(rectified)[:, :, ::-1]
+    if mirrored:
+        image = image[:, ::-1]
+    (h, w, _), (m, n) = image.shape, shape
+    cells = image[: h - h % m, : w - w % n].reshape(m, h // m, n, w // n, 3)  # crops less than one cell
+    mean: Array = cells.mean(axis=(1, 3), dtype=np.float64)
+    return np.rint(mean).astype(np.uint8)

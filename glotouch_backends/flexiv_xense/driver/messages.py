@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-PROTOCOL = 5
+PROTOCOL = 6
 """Version of the messages; client and driver must have the same."""
 MAX_REQUEST_BYTES = 64 * 1024
 """Largest request without the world of simulated devices; `Open` with all its limits has 1 kB. Source: ours."""
@@ -75,13 +75,14 @@ class ArmLimits(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class HandLimits(msgspec.Struct, frozen=True, kw_only=True):
-    """Ranges of the gripper and its pads."""
+    """Ranges of the gripper and its pads; `image_shape` is None if no gel images are wanted."""
 
     stroke_m: Length
     speed_m_s: Speed
     force_N: Force
     pad_shape: tuple[PixelCount, PixelCount]
     pad_depth_m: Length
+    image_shape: tuple[PixelCount, PixelCount] | None = None
 
 
 class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True):
@@ -173,11 +174,12 @@ class Open(_Numbered, frozen=True, kw_only=True):
 
 
 class Cycle(_Numbered, frozen=True, kw_only=True):
-    """Run one control period."""
+    """Run one control period; `images` requests one pair of gel images, which comes with a later block."""
 
     setpoint: Setpoint | None = None
     jaws: JawTarget | None = None
     tactile: bool = False
+    images: bool = False
 
 
 class TareRequest(_Numbered, frozen=True, kw_only=True):
@@ -254,6 +256,16 @@ class Maps(msgspec.Struct, frozen=True, array_like=True):
     right: bytes
 
 
+class Images(msgspec.Struct, frozen=True, array_like=True):
+    """Gel images as bytes red, green, blue of each pixel: row 0 nearest the flange, columns along +x_P for both."""
+
+    stamp_s: float
+    rows: int
+    columns: int
+    left: bytes
+    right: bytes
+
+
 class Done(msgspec.Struct, frozen=True, array_like=True):
     """A slow request has ended; `error` is empty if it succeeded."""
 
@@ -291,6 +303,7 @@ class Block(_Numbered, frozen=True, kw_only=True):
     samples: bytes
     jaws: JawState
     maps: Maps | None = None
+    images: Images | None = None
     done: tuple[Done, ...] = ()
     late: int = 0
     stop: tuple[str, float, float, float] | None = None

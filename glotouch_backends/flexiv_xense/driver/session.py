@@ -92,8 +92,10 @@ class DriverSession:
         """
         if self.failed is not None:
             raise self.failed
-        if cycle.tactile and self.devices.pads is not None:
+        if (cycle.tactile or cycle.images) and self.devices.pads is not None:
             self.devices.pads.request()
+            if cycle.images:
+                self.devices.pads.request_images()
         if self.stop is not None:
             return
         try:
@@ -238,6 +240,11 @@ class DriverSession:
             m = self.devices.pads.take()
             if m is not None:
                 maps = messages.Maps(m.stamp_s - self._zero_s, m.rows, m.columns, m.left, m.right)
+        images = None if self.devices.pads is None else self.devices.pads.take_images()
+        if images is not None:
+            images = messages.Images(
+                images.stamp_s - self._zero_s, images.rows, images.columns, images.left, images.right
+            )
         n = len(self._rows)
         stamps = np.array([self._stamps.popleft() for _ in range(n)])
         rows = np.array([self._rows.popleft() for _ in range(n)]).reshape(n, messages.COLUMNS)
@@ -248,6 +255,7 @@ class DriverSession:
             samples=rows.astype("<f8").tobytes(),
             jaws=self._jaws,
             maps=maps,
+            images=images,
             done=done,
             late=late,
             stop=self.stop,

@@ -11,7 +11,7 @@ import numpy as np
 from glotouch_backends.mujoco.control import JawReports, JawServo
 from glotouch_backends.mujoco.model import STEP_S, STEPS, BuiltWorld
 from glotouch_backends.mujoco.sensing import Tactile
-from glotouch_bt.robot import Array, GripperState, GripperTarget, TactileFrame
+from glotouch_bt.robot import Array, GelImages, GripperState, GripperTarget, TactileFrame
 
 PERIOD_S = STEPS * STEP_S
 WANTED_S = 0.1
@@ -35,6 +35,7 @@ class SimulatedHand:
     Attributes:
         status: Last report of the jaws.
         frame: Last pair of depth maps that arrived, or None.
+        images: Last pair of gel images that arrived, or None.
     """
 
     def __init__(self, built: BuiltWorld) -> None:
@@ -53,6 +54,8 @@ class SimulatedHand:
         self._wanted_s = -math.inf
         self.status = JawStatus(aperture, 0.0, 0.0)
         self.frame: TactileFrame | None = None
+        self.images: GelImages | None = None
+        self._images_wanted = False
 
     def go_to(self, position_m: float, speed_m_s: float, force_N: float) -> None:
         """Set a target from the next period on; clamp it to the ranges, and ignore what is not finite."""
@@ -70,6 +73,10 @@ class SimulatedHand:
         """Note that a sensor is being read."""
         self._wanted_s = self._now_s
 
+    def want_images(self) -> None:
+        """Note that a sensor is asked for its image; it is rendered with the next frame, as it costs much time."""
+        self._images_wanted = True
+
     def begin(self) -> Array:
         """Return the jaws' servo commands (steps, 2) of the next period."""
         self._jaws.plan(self._aperture, PERIOD_S, self._rows)
@@ -83,10 +90,12 @@ class SimulatedHand:
         jaws, speeds, forces = last[s.jaws], last[s.jaw_speeds], last[s.jaw_forces]
         self._aperture = jaws[0] + jaws[1]
         wanted = now_s - self._wanted_s <= WANTED_S
-        self._tactile.sample(now_s, wanted, jaws, forces)
+        self._tactile.sample(now_s, wanted, jaws, forces, self._images_wanted)
+        self._images_wanted = False
         rate = speeds[0] + speeds[1]
         force = max(0.0, -0.5 * (forces[0] + forces[1]))
         report = self._reports.report(now_s, self._aperture - self._tactile.shift_m, rate, force)
         self._speeds.append(rate)
         self.status = JawStatus(report.aperture_m, self._speeds[0], report.force_N)
         self.frame = self._tactile.arrived(now_s, True) or self.frame
+        self.images = self._tactile.arrived_images(now_s) or self.images

@@ -80,6 +80,20 @@ def pad_pose_P(side: Side, distance_m: float) -> Pose:
     return Pose.from_matrix([0.0, sign * distance_m, 0.0], _ROTATION_P_PAD[side])
 
 
+def pad_poses_P(distance_m: tuple[float, float], shear_m: Array | None = None) -> tuple[Pose, Pose]:
+    """Return the frames of the left and the right pad in P.
+
+    Args:
+        distance_m: (left, right) distance of each undeformed gel surface from the plane y_P = 0.
+        shear_m: (2, 2) shift of the left and the right gel's surface along x_P and z_P; the imprints shift with it.
+    """
+    left_P, right_P = pad_pose_P("left", distance_m[0]), pad_pose_P("right", distance_m[1])
+    if shear_m is None:
+        return left_P, right_P
+    (lx, lz), (rx, rz) = shear_m.tolist()
+    return Pose(np.array([-lx, 0.0, -lz])) @ left_P, Pose(np.array([-rx, 0.0, -rz])) @ right_P
+
+
 @dataclass(frozen=True)
 class PairPress:
     """Depth maps and shifts of both pads.
@@ -208,14 +222,10 @@ class GelSensor:
 
         Args:
             surfaces: Each object's rays and `pose_O_P`, the hand frame P in that object's mesh frame.
-            distance_m: (left, right) distance of each undeformed gel surface from the plane y_P = 0.
+            distance_m, shear_m: See `pad_poses_P`.
             force_N: (left, right) normal force on each pad's face.
-            shear_m: (2, 2) shift of the left and the right gel's surface along x_P and z_P; the imprints shift with it.
         """
-        left_P, right_P = pad_pose_P("left", distance_m[0]), pad_pose_P("right", distance_m[1])
-        if shear_m is not None:
-            (lx, lz), (rx, rz) = shear_m.tolist()
-            left_P, right_P = Pose(np.array([-lx, 0.0, -lz])) @ left_P, Pose(np.array([-rx, 0.0, -rz])) @ right_P
+        left_P, right_P = pad_poses_P(distance_m, shear_m)
         left, left_shift = self.press("left", [(r, p @ left_P) for r, p in surfaces], force_N[0])
         right, right_shift = self.press("right", [(r, p @ right_P) for r, p in surfaces], force_N[1])
         return PairPress(left, right, left_shift, right_shift)

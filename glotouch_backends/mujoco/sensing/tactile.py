@@ -16,26 +16,43 @@ from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.model import BuiltWorld, Handles, handle_mesh
 from glotouch_backends.mujoco.printed import Roughness
 from glotouch_backends.mujoco.sensing.depth import DepthErrors
-from glotouch_backends.mujoco.sensing.gel import BOTTOM_M, STIFFNESS_N_MM3, GelSensor, PairPress
+from glotouch_backends.mujoco.sensing.gel import BOTTOM_M, STIFFNESS_N_MM3, GelSensor, PairPress, pad_poses_P
+from glotouch_backends.mujoco.sensing.image import GelImager
 from glotouch_backends.mujoco.sensing.rays import SurfaceRays
-from glotouch_bt.robot import Array, Conditions, Gripper, Pose, TactileFrame
+from glotouch_bt.robot import Array, Conditions, GelImages, Gripper, Pose, TactileFrame
 from glotouch_bt.robot.scene import stream
 
+Surfaces = list[tuple[SurfaceRays, Pose]]
+"""Each object's rays, and the pose of a pad in its mesh frame."""
 MAX_SAME_TRAVEL_M = 1e-5
 """Do not solve the gel again while the jaws have moved less than this. Source: ours."""
 MAX_SAME_FORCE_N = 0.5
 """Do not solve the gel again while the jaws' forces have changed less than this. Source: ours."""
 
 
-def gel_of_trial(gripper: Gripper, conditions: Conditions, seed: int, proof: AxisProof) -> GelSensor:
-    """Return the gel of both pads, with the stiffness and thickness of the trial."""
+def gel_of_trial(
+    gripper: Gripper, conditions: Conditions, seed: int, proof: AxisProof, shape: tuple[int, int] | None = None
+) -> GelSensor:
+    """Return the gel of both pads, with the stiffness and thickness of the trial.
+
+    `shape` (rows, cols) is that of the maps by default.
+    """
     c, rng = conditions, stream(seed, "gel material")
     stiffer, thicker = float(rng.uniform(*c.gel_stiffness_factor)), float(rng.uniform(*c.gel_thickness_factor))
     proof.saw("gel_stiffness_factor", 1.0, stiffer)
     proof.saw("gel_thickness_factor", 1.0, thicker)
     # A Winkler modulus is the confined modulus over the thickness.
     stiffness, bottom = STIFFNESS_N_MM3 * stiffer / thicker, BOTTOM_M * thicker
-    return GelSensor(gripper.pad_window_m, gripper.pad_shape, gripper.pad_depth_m, stiffness, bottom_m=bottom)
+    shape = shape or gripper.pad_shape
+    return GelSensor(gripper.pad_window_m, shape, gripper.pad_depth_m, stiffness, bottom_m=bottom)
+
+
+def imager_of_trial(gripper: Gripper, conditions: Conditions, seed: int, proof: AxisProof) -> GelImager | None:
+    """Return the cameras of both pads with the errors of the trial, or None if the gripper has none."""
+    camera = gripper.camera
+    if camera is None:
+        return None
+    return GelImager(camera, gel_of_trial(gripper, conditions, seed, proof, camera.shape), conditions, seed, proof)
 
 
 class TaxelErrors:
@@ -139,36 +156,50 @@ class Tactile:
         self._tick = -1
         self._solved = (np.inf, np.inf, 0.0, 0.0)
         self._press: PairPress | None = None
+        self._imager = imager_of_trial(gripper, conditions, built.seed, built.proof)
+        self._image_noise = stream(built.seed, "gel image noise")
+        self._images: deque[tuple[float, GelImages]] = deque()
+        self._image_due = False
         self._zero = np.zeros(gripper.pad_shape)
         self.shift_m = 0.0
 
-    def sample(self, now_s: float, wanted: bool, jaws: Sequence[float], jaw_forces: Sequence[float]) -> None:
+    def sample(
+        self, now_s: float, wanted: bool, jaws: Sequence[float], jaw_forces: Sequence[float], images: bool = False
+    ) -> None:
         """Take a frame if one is due. Call once a period, after its last step.
 
         Args:
             now_s: Robot clock.
             wanted: True if frames are requested; else the gel is solved again only when jaws or forces have changed.
             jaws, jaw_forces: (left, right) present travel m and servo force N.
+            images: Take one pair of gel images with the next frame.
         """
+        self._image_due |= images and self._imager is not None
         tick = int(now_s * self._c.tactile_rate_Hz + 1e-6)
         if tick == self._tick:
             return
         self._tick = tick
-        if not wanted and self._unchanged(jaws, jaw_forces):
+        if not (wanted or self._image_due) and self._unchanged(jaws, jaw_forces):
             return
         self._solved = (jaws[0], jaws[1], jaw_forces[0], jaw_forces[1])
         forces, bodies = self._pads.touch()
+        pads: tuple[Surfaces, Surfaces] = [], []
         if bodies:
-            self._solve(forces, bodies, (jaws[0], jaws[1]))
+            pads = self._solve(forces, bodies, (jaws[0], jaws[1]))
         else:
             self._press, self.shift_m = None, 0.0
         maps = self._true_maps()
         self.depth.feel(maps, now_s)
+        if not (wanted or self._image_due):
+            return
+        late_s = self._c.tactile_latency_s
+        if self._c.latency_jitter_s > 0.0:
+            late_s = max(0.0, late_s + self._c.latency_jitter_s * float(self._jitter.uniform(-1.0, 1.0)))
         if wanted:
-            late_s = self._c.tactile_latency_s
-            if self._c.latency_jitter_s > 0.0:
-                late_s = max(0.0, late_s + self._c.latency_jitter_s * float(self._jitter.uniform(-1.0, 1.0)))
             self._frames.append((now_s + late_s, self._frame(now_s, maps)))
+        if self._image_due and self._imager is not None:
+            self._images.append((now_s + late_s, self._image(self._imager, now_s, pads)))
+            self._image_due = False
 
     def _unchanged(self, jaws: Sequence[float], jaw_forces: Sequence[float]) -> bool:
         left, right, left_N, right_N = self._solved
@@ -184,10 +215,29 @@ class Tactile:
             newest = self._frames.popleft()[1]
         return newest if wanted else None
 
-    def _solve(self, forces: tuple[float, float], bodies: set[int], jaws: tuple[float, float]) -> None:
+    def arrived_images(self, now_s: float) -> GelImages | None:
+        """Return the newest pair of images that has arrived since the last call."""
+        newest = None
+        while self._images and self._images[0][0] <= now_s + 1e-9:
+            newest = self._images.popleft()[1]
+        return newest
+
+    def _image(self, imager: GelImager, now_s: float, pads: tuple[Surfaces, Surfaces]) -> GelImages:
+        """Return the images of what the pads press into; a pad without a force on it is flat."""
+        p, left_m, right_m = self._press, imager.flat(), imager.flat()
+        if p is not None and p.left_m.any():
+            left_m = imager.indentation("left", pads[0], p.left_shift_m)
+        if p is not None and p.right_m.any():
+            right_m = imager.indentation("right", pads[1], p.right_shift_m)
+        return imager.images(now_s, left_m, right_m, self._image_noise)
+
+    def _solve(
+        self, forces: tuple[float, float], bodies: set[int], jaws: tuple[float, float]
+    ) -> tuple[Surfaces, Surfaces]:
+        """Press the pads against the bodies; return the surfaces in front of the left and the right pad."""
         data = self._data
         pose_B_P = Pose.from_matrix(data.site_xpos[self._site], data.site_xmat[self._site].reshape(3, 3))
-        surfaces = []
+        surfaces: Surfaces = []
         for body in sorted(bodies & self._meshes.keys()):
             if body not in self._rays:
                 self._rays[body] = SurfaceRays(self._meshes[body], self._roughness(body))
@@ -198,6 +248,8 @@ class Tactile:
             self._proof.saw("tactile_shear_m_per_N", 0.0, shear)
         self._press = self._gel.press_pair(surfaces, jaws, forces, shear)
         self.shift_m = self._press.left_shift_m + self._press.right_shift_m
+        left_P, right_P = pad_poses_P(jaws, shear)
+        return [(r, p @ left_P) for r, p in surfaces], [(r, p @ right_P) for r, p in surfaces]
 
     def _roughness(self, body: int) -> Roughness | None:
         """Return the roughness of an object; the probe's handle is smooth."""

@@ -29,7 +29,7 @@ from glotouch_backends.mujoco.simulation.snapshot_check import (
 )
 from glotouch_bt.robot import BadInput, SafetyStop, Snapshot
 
-FORMAT = 3
+FORMAT = 4
 PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_depth", "_taxels", "_reports", "proof")
 FIXED: Mapping[str, frozenset[str]] = {
     "MujocoRobot": frozenset(
@@ -59,7 +59,7 @@ FIXED: Mapping[str, frozenset[str]] = {
     "WristSensor": frozenset(("_P_in_S", "_proof", "_gain_error", "_cross_talk", "_reach", "_jitter", "_calibrated")),
     "HardLimitGuard": frozenset(("_max_N", "_max_Nm", "_quiet_2", "_rise_s_m", "_samples_ahead", "tripped")),
     "Tactile": frozenset(
-        ("_data", "_pads", "_site", "_gel", "_meshes", "_rays", "_c", "depth", "taxels", "_proof", "_smooth")
+        ("_data", "_pads", "_site", "_gel", "_imager", "_meshes", "_rays", "_c", "depth", "taxels", "_proof", "_smooth")
     ),
     "DepthErrors": frozenset(
         (
@@ -162,10 +162,10 @@ class SnapshotStore:
         parts = _parts(robot)
         if not (isinstance(kept["parts"], dict) and kept["parts"].keys() == parts.keys()):
             raise BadInput("the saved state of the robot's parts is of another version")
-        pad_shape = vars(robot)["description"].gripper.pad_shape
+        gripper = vars(robot)["description"].gripper
         for name, part in parts.items():
             now = {n: vars(part)[n] for n in _names(part)}
-            require_attributes(kept["parts"][name], now, type(part).__name__, pad_shape)
+            require_attributes(kept["parts"][name], now, type(part).__name__, gripper)
 
     @property
     def _sizes(self) -> tuple[int, ...]:

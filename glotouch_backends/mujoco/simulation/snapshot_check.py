@@ -17,7 +17,7 @@ import numpy as np
 
 from glotouch_backends.mujoco.control import PendingPayload, PendingTare
 from glotouch_backends.mujoco.sensing import PairPress
-from glotouch_bt.robot import BadInput, SetPayload, TactileFrame, Tare
+from glotouch_bt.robot import BadInput, GelImages, Gripper, SetPayload, TactileFrame, Tare
 
 MAX_TIME_S = 1e6
 """Latest simulated time of a snapshot. Source: ten times the longest mission."""
@@ -102,14 +102,14 @@ def require_stop(given: object) -> None:
         _Structure({}).require(given, ("force_N", 0.0, 0.0, 0.0), "tripped")
 
 
-def require_attributes(given: object, now: Mapping[str, Any], part: str, pad_shape: tuple[int, int]) -> None:
+def require_attributes(given: object, now: Mapping[str, Any], part: str, gripper: Gripper) -> None:
     """Require the attributes of a part of the robot to have the structure that they have now.
 
     Args:
         given: The saved attributes.
         now: The present ones.
         part: Name of the part.
-        pad_shape: Rows and columns of a depth map.
+        gripper: The hand; it has the shapes of depth maps and images.
 
     Raises:
         BadInput: An attribute is missing, or is of another type, shape or kind, or not finite.
@@ -119,7 +119,9 @@ def require_attributes(given: object, now: Mapping[str, Any], part: str, pad_sha
     odd = sorted(map(str, given.keys() ^ now.keys()))
     if odd:
         raise BadInput(f"the saved state of {part} is of another version ({', '.join(odd)})")
-    frame = TactileFrame(0.0, np.zeros(pad_shape), np.zeros(pad_shape))
+    frame = TactileFrame(0.0, np.zeros(gripper.pad_shape), np.zeros(gripper.pad_shape))
+    pixels = np.zeros((*(gripper.camera.shape if gripper.camera else (0, 0)), 3), dtype=np.uint8)
+    images = GelImages(0.0, pixels, pixels)
     structure = _Structure(
         {
             "_tare": PendingTare(Tare(1.0), 1),
@@ -128,7 +130,9 @@ def require_attributes(given: object, now: Mapping[str, Any], part: str, pad_sha
             "_up_at_tare": np.zeros(3),
             "_press": PairPress(frame.left_m, frame.right_m, 0.0, 0.0),
             "_frames": (0.0, frame),
+            "_images": (0.0, images),
             "tactile": frame,
+            "images": images,
             "error": "",
         }
     )

@@ -55,6 +55,7 @@ class MatchCampaign(Campaign):
         strangers: Folder of STL files that are never in the box, used as absent targets; or None.
         dataset: Folder of recorded TouchSets to use instead; it defines seeds (except their number) and conditions.
         sampled: Touch standing objects without a robot instead of running the mission.
+        gel_images: Take gel images with every closure; needs `sampled`.
         touched: Compare the method `TOUCHED`, too, which knows each object by one handling only; needs `sampled`.
         in_the_box: Objects in a layout. From a larger folder, each seed draws this many.
     """
@@ -64,6 +65,7 @@ class MatchCampaign(Campaign):
     strangers: Path | None = None
     dataset: Path | None = None
     sampled: bool = False
+    gel_images: bool = False
     touched: bool = False
     in_the_box: int = IN_THE_BOX
 
@@ -85,6 +87,8 @@ class MatchCampaign(Campaign):
         load_folder(self.folder)
         if self.touched and (not self.sampled or self.strangers is not None):
             raise BadInput("--touched: needs --sampled, and cannot be combined with --strangers")
+        if self.gel_images and not self.sampled:
+            raise BadInput("--gel-images: needs --sampled")
         if self.in_the_box > IN_THE_BOX and not self.sampled:
             raise BadInput(f"--in-box {self.in_the_box}: more than {IN_THE_BOX} objects need --sampled")
         if self.strangers is not None:
@@ -105,7 +109,7 @@ class MatchCampaign(Campaign):
         run, failed = partial(layout_task, self, seed, file), partial(failed_task, self, seed)
         return self.trial(
             f"layouts/{name}", run, failed, seed=seed, methods=self.methods, sampled=self.sampled,
-            touched=self.touched, in_the_box=self.in_the_box, inputs=content
+            gel_images=self.gel_images, touched=self.touched, in_the_box=self.in_the_box, inputs=content
         )  # fmt: skip
 
     def layout_request(self, seed: int) -> RunRequest:
@@ -139,7 +143,7 @@ def layout_task(campaign: MatchCampaign, seed: int, file: Path | None) -> dict[s
     elif campaign.sampled:
         world = load_mission(campaign.mission, {}, objects=campaign.box(seed)).world
         conditions = load_conditions(campaign.conditions)
-        layout = sampled_layout(campaign.backend, world, conditions, seed)
+        layout = sampled_layout(campaign.backend, world, conditions, seed, images=campaign.gel_images)
         write_layout(campaign.out / "touchsets", layout)
         if campaign.touched:
             handled = handled_objects(campaign.backend, world, conditions, seed)
@@ -220,6 +224,7 @@ def run_campaign(campaign: MatchCampaign, executor: Executor, on_row: OnRow = si
             "nameless": sum(x["nameless"] for x in layouts),
             "recorded": campaign.dataset is not None,
             "sampled": campaign.sampled,
+            "gel_images": campaign.gel_images,
             "strangers": sorted({t["target"] for t in rows["trials"] if t["kind"] == "stranger"}),
             "mission": campaign.mission,
             "backend": campaign.backend,

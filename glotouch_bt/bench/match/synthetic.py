@@ -17,6 +17,7 @@ from glotouch_bt.perception.touch import (
     TouchSet,
     fit_contour,
     pad_noise_m,
+    relief_of_images,
 )
 from glotouch_bt.robot import Array, BadInput, Conditions, World, load_backend
 from glotouch_bt.robot.scene import stl_files, stream
@@ -42,14 +43,14 @@ MAX_CLOSURES = 20
 """Largest number of closures of one handling. Source: `RememberParams`."""
 
 
-def sampled_layout(backend: str, world: World, conditions: Conditions, seed: int) -> Layout:
+def sampled_layout(backend: str, world: World, conditions: Conditions, seed: int, *, images: bool = False) -> Layout:
     """Touch every object of a trial as `sample_layout` does.
 
     Raises:
         BadInput: The backend has no `TouchSampler`, or the objects cannot be used.
     """
     boxes = [
-        sample_layout(sampler, seed, conditions.name, k * BOX)
+        sample_layout(sampler, seed, conditions.name, k * BOX, images=images)
         for k, sampler in enumerate(samplers(backend, world, conditions, seed))
     ]
     names = tuple(name for box in boxes for name in box.objects)
@@ -75,15 +76,15 @@ def samplers(backend: str, world: World, conditions: Conditions, seed: int) -> l
     return out
 
 
-def sample_layout(sampler: TouchSampler, seed: int, conditions: str, first: int = 0) -> Layout:
+def sample_layout(sampler: TouchSampler, seed: int, conditions: str, first: int = 0, *, images: bool = False) -> Layout:
     """Touch every object once; equal seeds draw equal stances whatever the conditions.
 
-    Candidates are numbered from `first`.
+    Candidates are numbered from `first`. `images` takes gel images with every closure, too.
     """
     touched = []
     for index, name in enumerate(sampler.names, first):
         rng = stream(seed, f"stances {name}")
-        touchset, place = _touch(sampler, name, index, rng)
+        touchset, place = _touch(sampler, name, index, rng, images)
         touched.append(Touched(touchset, name, place, 0.0))
     return Layout(seed, conditions, sampler.names, tuple(touched))
 
@@ -96,14 +97,14 @@ def handled_objects(backend: str, world: World, conditions: Conditions, seed: in
     """
     seed += HANDLED_SEED
     return {
-        name: _touch(sampler, name, 0, stream(seed, f"handling {name}"), True)[0]
+        name: _touch(sampler, name, 0, stream(seed, f"handling {name}"), False, True)[0]
         for sampler in samplers(backend, world, conditions, seed)
         for name in sampler.names
     }
 
 
 def _touch(
-    sampler: TouchSampler, name: str, index: int, rng: np.random.Generator, alone: bool = False
+    sampler: TouchSampler, name: str, index: int, rng: np.random.Generator, images: bool, alone: bool = False
 ) -> tuple[TouchSet, Place]:
     solid = sampler.solid(name).as_trimesh()
     place: Place = (*rng.uniform(-0.05, 0.05, 2).tolist(), float(rng.uniform(-math.pi, math.pi)))
@@ -126,7 +127,7 @@ def _touch(
         place = (place[0] + drift[0], place[1] + drift[1], place[2] + drift[2])
         layers = []
         for height in heights:
-            layer, place = _close(sampler, name, place, stance, float(height))
+            layer, place = _close(sampler, name, place, stance, float(height), images)
             layers.append(layer)
         sequences.append(TouchSequence(np.array(stance[:2]), stance[2], tuple(layers)))
     return TouchSet(candidate, tuple(sequences)), place
@@ -158,12 +159,20 @@ def _handling(contour: Contour, rng: np.random.Generator, count: int) -> list[Pl
     return tracks + turned
 
 
-def _close(sampler: TouchSampler, name: str, place: Place, hand: Place, height_m: float) -> tuple[Layer, Place]:
-    free = sampler.untouched()
-    done = sampler.close(name, place, hand, height_m, FORCE_N)
+def _close(
+    sampler: TouchSampler, name: str, place: Place, hand: Place, height_m: float, images: bool
+) -> tuple[Layer, Place]:
+    free, untouched = sampler.untouched(), sampler.untouched_images() if images else None
+    done = sampler.close(name, place, hand, height_m, FORCE_N, images=images)
     position: Array = np.array(hand[:2])
     if done is None:
         empty = np.zeros_like(free.left_m)
         return Layer(height_m, 0.0, position, hand[2], empty, empty, 0.0, False, "jaws met"), place
     left, right, noise = done.frame.left_m, done.frame.right_m, pad_noise_m([free])
-    return Layer(height_m, done.aperture_m, position, hand[2], left, right, FORCE_N, True, noise_m=noise), done.place
+    relief = None
+    if done.images is not None and untouched is not None:
+        relief = relief_of_images(done.images, untouched, sampler.gripper)
+    layer = Layer(
+        height_m, done.aperture_m, position, hand[2], left, right, FORCE_N, True, noise_m=noise, relief=relief
+    )
+    return layer, done.place

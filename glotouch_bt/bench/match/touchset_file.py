@@ -2,8 +2,8 @@
 
 A file holds columns, `<part>.<field>`: `candidate`, `contour`, `contact`, `sequence` and `layer` rows, in the order of
 the TouchSet, plus `sequence.layers` (how many layers each sequence has) and `version`. Floats are stored as float64,
-bit for bit; nothing is pickled. A field added by a later release becomes a new column; a file without it is read with
-the field's default.
+bit for bit; nothing is pickled. An optional array is a row of NaN where it is missing, and no column if it always is.
+A field added by a later release becomes a new column; a file without it is read with the field's default.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 import numpy as np
 import numpy.typing as npt
 
-from glotouch_bt.perception.touch import Candidate, Contact, Contour, Layer, TouchSequence, TouchSet
+from glotouch_bt.perception.touch import BLOCKS, Candidate, Contact, Contour, Layer, TouchSequence, TouchSet
 from glotouch_bt.robot import BadInput
 from glotouch_bt.untrusted import write_file
 
@@ -29,6 +29,7 @@ SHAPES: Mapping[str, tuple[int | None, ...]] = {
     "contact.tip_K_m": (3,), "contact.approach_K": (3,), "contact.reaction_K": (3,), "contact.point_K_m": (2,),
     "contact.pushed_K_m": (2,), "sequence.position_K_m": (2,), "layer.position_K_m": (2,),
     "layer.left_m": (None, None), "layer.right_m": (None, None), "layer.noise_m": (2,),
+    "layer.relief": (2, 2, *BLOCKS),
 }  # fmt: skip
 """Shape of one row of an array field; None is any length. Other fields are scalars, strings, or arrays of any shape."""
 
@@ -106,7 +107,11 @@ def _columns(part: str, items: Sequence[Any]) -> dict[str, Column]:
     out: dict[str, Column] = {}
     for field, hint in _plain(type(items[0])) if items else []:
         name = f"{part}.{field.name}"
-        rows = [np.asarray(getattr(item, field.name)) for item in items]
+        values = [getattr(item, field.name) for item in items]
+        given = [v for v in values if v is not None]
+        if not given:
+            continue
+        rows = [np.asarray(np.full_like(given[0], np.nan) if v is None else v) for v in values]
         if len({r.shape for r in rows}) > 1:
             raise BadInput(f"{name}: its rows differ in shape: {', '.join(sorted({str(r.shape) for r in rows}))}")
         column = np.stack(rows)
@@ -177,4 +182,6 @@ def _value(hint: Any, row: Any) -> Any:
         return hint(row)
     if _is_word(hint):
         return str(row)
+    if type(None) in get_args(hint) and np.isnan(row).all():
+        return None
     return tuple(row.tolist()) if get_origin(hint) is tuple else np.array(row)

@@ -27,6 +27,9 @@ def match(
     sampled: Annotated[
         bool, typer.Option("--sampled", help="touch the objects without a robot, in about a second a layout")
     ] = False,
+    gel_images: Annotated[
+        bool, typer.Option("--gel-images", help="with --sampled: take images of the gels, too, which show fine relief")
+    ] = False,
     touched: Annotated[
         bool,
         typer.Option(
@@ -56,6 +59,7 @@ def match(
         strangers=strangers,
         dataset=dataset,
         sampled=sampled,
+        gel_images=gel_images,
         touched=touched,
         in_the_box=in_box,
         methods=chosen(method or ()),

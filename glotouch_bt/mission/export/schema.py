@@ -89,6 +89,7 @@ def _opened(made: dict[str, Any], references: bool) -> dict[str, Any]:
     for name, body in made.get("properties", {}).items():
         unit = body.pop("unit", "")
         body.pop("names", "")
+        body.pop("needs", "")
         units = units_for(unit) if unit else list(UNITS) if body.pop("any_unit", False) else []
         if unit:
             body["description"] = f"{body.get('description', name)}, {unit}"

@@ -1,6 +1,6 @@
 """Read YAML into nodes, parameters, worlds and conditions. Faults become findings with places; nothing is run."""
 
-from glotouch_bt.mission.read.fields import limits_of, unit_of, validate
+from glotouch_bt.mission.read.fields import limits_of, needed_by, unit_of, validate
 from glotouch_bt.mission.read.library import (
     RESUME_CHECK_GROUP,
     SkillRegistry,

@@ -75,6 +75,11 @@ def named_by(field: FieldInfo) -> str:
     return _extra(field, "names")
 
 
+def needed_by(field: FieldInfo) -> str:
+    """Return the optional part of the gripper that a parameter needs, or empty."""
+    return _extra(field, "needs")
+
+
 def limits_of(field: FieldInfo) -> list[tuple[str, float, Callable[[float, float], bool]]]:
     """Return (symbol, limit, comparison) of each limit of a number, or of each number of a list."""
     rules = [*field.metadata, *(rule for item in _items(field) for rule in item.metadata)]

@@ -130,6 +130,8 @@ CHANNELS: Mapping[str, str] = {
     "/packed/samples": PACKED_NAME,
     "/packed/cycles": PACKED_NAME,
     "/packed/tactile": PACKED_NAME,
+    "/packed/images": PACKED_NAME,
+    "/packed/image_requests": PACKED_NAME,
 }
 EVENT_PREFIX = "/events/"
 

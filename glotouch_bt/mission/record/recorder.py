@@ -206,6 +206,7 @@ class Recorder:
             self._encode_samples(observations)
             self._encode_cycles(observations, commands)
             self._encode_tactile(observations)
+            self._encode_images(observations, commands)
             self._cycles += len(observations)
         pending, self._pending = self._pending, []
         pending.sort(key=lambda m: m[0])  # stable: equal stamps stay in the order of writing
@@ -321,6 +322,26 @@ class Recorder:
                 self._next_image_ns = ns + _ns(IMAGE_EVERY_S)
                 self._put(ns, "/tactile/left", plots.depth_image(ns, "pad_left", frame.left_m))
                 self._put(ns, "/tactile/right", plots.depth_image(ns, "pad_right", frame.right_m))
+
+    def _encode_images(self, observations: list[Observation], commands: list[Command]) -> None:
+        """Write every pair of gel images, each a message of its own, and the cycles in which one was requested."""
+        for o in observations:
+            if o.images is not None:
+                start_ns, shape = _ns(o.images.stamp_s), o.images.left.shape
+                columns = (
+                    Column("stamp_s", (), STAMP_S, 2),
+                    Column("arrived_s", (), STAMP_S, 2),
+                    Column("left", shape, 1.0, 0),
+                    Column("right", shape, 1.0, 0),
+                )
+                stamps = np.array([[o.images.stamp_s], [o.now_s]]) - start_ns * 1e-9
+                values = (*stamps, o.images.left[None], o.images.right[None])
+                self._put(start_ns, "/packed/images", pack(start_ns, columns, values))
+        asked_s = np.array([o.now_s for o, c in zip(observations, commands, strict=True) if c.images])
+        if len(asked_s):
+            start_ns = _ns(asked_s[0])
+            column = Column("stamp_s", (), STAMP_S, 2)
+            self._put(start_ns, "/packed/image_requests", pack(start_ns, (column,), (asked_s - start_ns * 1e-9,)))
 
 
 def _ns(stamp_s: float) -> int:

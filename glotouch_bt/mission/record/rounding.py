@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from glotouch_bt.compiled import compiled
-from glotouch_bt.robot import Array, GripperState, Observation, TactileFrame
+from glotouch_bt.robot import Array, GelImages, GripperState, Observation, TactileFrame
 
 # Rounding step of each quantity, in the unit of its name.
 STAMP_S = 1e-7
@@ -79,9 +79,20 @@ class Rounding:
         if frame is not None:
             left, right = to_step(frame.left_m, DEPTH_M), to_step(frame.right_m, DEPTH_M)
             frame = TactileFrame(_number(frame.stamp_s, STAMP_S), left, right)
+        images = o.images
+        if images is not None:
+            images = GelImages(_number(images.stamp_s, STAMP_S), images.left, images.right)
         dq, p, w, f = self._dq, self._p, self._w, self._f
         return Observation(
-            block[:, 0], block[:, 1:dq], block[:, dq:p], block[:, p:w], block[:, w:f], block[:, f:], gripper, frame
+            block[:, 0],
+            block[:, 1:dq],
+            block[:, dq:p],
+            block[:, p:w],
+            block[:, w:f],
+            block[:, f:],
+            gripper,
+            frame,
+            images,
         )
 
 

@@ -71,6 +71,12 @@ _KINDS = (
         "move the container or the stand in the world file, or use an arm that reaches farther",
     ),
     _Error(
+        "missing_part",
+        "a skill is told to use a part that the robot's gripper does not have",
+        "the run is refused before anything moves",
+        "set the parameter to false, or use a robot that has the part",
+    ),
+    _Error(
         "target_out_of_reach",
         "the target is too low to be felt, or too wide for the jaws",
         "the mission can only fail",

@@ -36,6 +36,7 @@ class LayerEvidence:
         height_m: Height of the pads' mid-point.
         images: (left, right) features (35,); None for a pad without contact.
         sunk_m: (left, right) indentation of the highest point.
+        relief: (2, 2, 7, 5) relief of both pads' images; None without images.
     """
 
     sequence: int
@@ -48,6 +49,7 @@ class LayerEvidence:
     height_m: float
     images: tuple[Array | None, Array | None]
     sunk_m: tuple[float, float]
+    relief: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ def read_evidence(touchset: TouchSet, pad: PadSpec) -> Evidence:
         yaw, z, width = float(layer.yaw_rad), layer.height_m, layer.aperture_m + sum(sunk)
         along = float(hand_axes(np.asarray(layer.yaw_rad))[0] @ (np.asarray(layer.position_K_m) - centre))
         weight = 1.0 if felt == 2 else ONE_SIDED
-        layers.append(LayerEvidence(k, h, width, weight, felt < 2, yaw, along, z, (left, right), sunk))
+        layers.append(LayerEvidence(k, h, width, weight, felt < 2, yaw, along, z, (left, right), sunk, layer.relief))
     both = sum(e.weight for e in layers if not e.upper_only)
     one = min(sum(e.weight for e in layers if e.upper_only), 1.0)
     return Evidence(tuple(layers), np.array([s.yaw_rad for s in touchset.sequences]), both + one)

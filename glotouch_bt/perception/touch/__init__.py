@@ -31,6 +31,7 @@ from glotouch_bt.perception.touch.outline import (
     split_at_motion,
 )
 from glotouch_bt.perception.touch.squeeze import (
+    BLOCKS,
     ObjectMotion,
     contact_threshold_m,
     estimate_object_motion,
@@ -42,6 +43,9 @@ from glotouch_bt.perception.touch.squeeze import (
     pad_noise_m,
     patch_statistics,
     relative_nonplanarity,
+    relief_of_closure,
+    relief_of_images,
+    relief_of_surface,
     temporal_median,
 )
 from glotouch_bt.perception.touch.values import Candidate, Contact, Contour, ContourKind, Layer, TouchSequence, TouchSet

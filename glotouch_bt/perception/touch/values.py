@@ -157,6 +157,8 @@ class Layer:
             about +z_K, closing after both pads touched; NaN if not estimated.
         zero_sd_m: Standard deviation of the aperture error common to all layers.
         noise_m: RMS of the (left, right) map before the closure, when the pads were untouched.
+        relief: (2, 2, 7, 5) RMS slope of the fine relief in both pads' images (`relief_of_images`); None without
+            images.
     """
 
     height_m: float
@@ -173,6 +175,7 @@ class Layer:
     compliance_m: float = math.nan
     zero_sd_m: float = ZERO_SD_M
     noise_m: tuple[float, float] = (PAD_NOISE_M, PAD_NOISE_M)
+    relief: Array | None = None
 
 
 @dataclass(frozen=True)

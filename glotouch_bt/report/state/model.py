@@ -222,6 +222,8 @@ class RunModel:
             part = reader.packed["tactile"].pop(0)
             for stamp_s, left, right in zip(part["arrived_s"], part["left_m"], part["right_m"], strict=True):
                 self._pads.add(float(stamp_s), (left.astype(np.float16), right.astype(np.float16)))
+        reader.packed["images"].clear()
+        reader.packed["image_requests"].clear()
         self._entries(reader.record)
         reader.record.events.clear()
         self._events_read = 0

@@ -15,9 +15,9 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from glotouch_bt.errors import BadInput
-from glotouch_bt.robot.definition.robot_file import BoxSection, GripperSection, RobotFile
+from glotouch_bt.robot.definition.robot_file import BoxSection, GelCameraSection, GripperSection, RobotFile
 from glotouch_bt.robot.definition.urdf import UrdfChain, read_chain
-from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription, forward
+from glotouch_bt.robot.description import Box, Capsule, GelCamera, Gripper, Joint, Link, RobotDescription, forward
 from glotouch_bt.robot.geometry import Pose
 from glotouch_bt.untrusted import read_file
 
@@ -169,8 +169,18 @@ def _gripper(given: GripperSection) -> Gripper:
         pose_E_P=Pose.planar(place.position_m, math.radians(place.yaw_deg)),
         body=tuple(map(box, given.body)),
         finger=box(given.finger),
+        camera=None if given.camera is None else _camera(given.camera),
         **{name: getattr(given, name) for name in names},
     )
+
+
+def _camera(given: GelCameraSection) -> GelCamera:
+    up = math.radians(given.elevation_deg)
+    red, green, blue = (
+        (math.cos(a) * math.cos(up), math.sin(a) * math.cos(up), math.sin(up))
+        for a in map(math.radians, given.azimuth_deg)
+    )
+    return GelCamera(shape=given.shape, lights=(red, green, blue))
 
 
 def _require_home(path: Path, robot: RobotDescription) -> None:

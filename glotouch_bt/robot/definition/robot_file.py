@@ -47,6 +47,18 @@ class BoxSection(RobotFileSection):
     half_m: PositiveVec3 = Field(description="half sizes, m")
 
 
+class GelCameraSection(RobotFileSection):
+    """The camera behind each gel; see `robot.GelCamera`."""
+
+    shape: tuple[Annotated[int, Field(ge=14, le=1000)], Annotated[int, Field(ge=10, le=1000)]] = Field(
+        description="rows and columns of an image"
+    )
+    azimuth_deg: Vec3 = Field(
+        description="directions of the red, green and blue light in the left image, deg from its columns to its rows"
+    )
+    elevation_deg: float = Field(ge=5.0, le=80.0, description="angle of the lights above the gel's surface, deg")
+
+
 class GripperSection(RobotFileSection):
     """A parallel gripper with a gel pad on each finger; see `robot.Gripper`."""
 
@@ -66,6 +78,9 @@ class GripperSection(RobotFileSection):
         description="rows and columns of a depth map"
     )
     pad_depth_m: float = Field(gt=0.0, description="largest indentation that a pad can show, m")
+    camera: GelCameraSection | None = Field(
+        default=None, description="camera behind each gel; without one, the pads give depth maps only"
+    )
 
 
 class RobotFile(RobotFileSection):

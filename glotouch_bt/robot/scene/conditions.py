@@ -14,7 +14,14 @@ from glotouch_bt.errors import ParamError
 Range = tuple[float, float]
 POSITIVE = (
     *("object_mass_kg", "object_friction", "pad_friction", "object_scale", "gel_stiffness_factor"),
-    *("gel_thickness_factor", "tactile_gain", "jaw_force_gain", "contact_softness_s", "housing_softness_s"),
+    *(
+        "gel_thickness_factor",
+        "tactile_gain",
+        "image_light_gain",
+        "jaw_force_gain",
+        "contact_softness_s",
+        "housing_softness_s",
+    ),
 )
 """Ranges of positive numbers."""
 
@@ -39,6 +46,9 @@ class Conditions:
         tactile_smooth_error_sd_m: Smooth error of a depth map, correlated over 5 mm.
         tactile_hysteresis_fraction: Share of the lost depth that is still shown when the gel is unloaded.
         tactile_shear_m_per_N: Shift of a pad's surface under a tangential force.
+        image_blur_m: Width (sd) of the Gaussian to which a gel image resolves the gel's surface.
+        image_light_gain: Brightness of each of a gel's three lights over the nominal one.
+        image_noise_sd: White noise of a gel image over its full scale.
         finger_flex_m_per_N: Outward motion of each fingertip under the closing force, unknown to the aperture sensor.
         jaw_force_gain, jaw_force_offset_N: True closing force = gain x reported force + offset.
         jaw_backlash_m: Play between aperture sensor and pads.
@@ -91,6 +101,9 @@ class Conditions:
     tactile_smooth_error_sd_m: float = 0.0
     tactile_hysteresis_fraction: float = 0.0
     tactile_shear_m_per_N: float = 0.0
+    image_blur_m: float = 0.0
+    image_light_gain: Range = (1.0, 1.0)
+    image_noise_sd: float = 0.0
     finger_flex_m_per_N: float = 0.0
     jaw_force_gain: Range = (1.0, 1.0)
     jaw_force_offset_N: Range = (0.0, 0.0)

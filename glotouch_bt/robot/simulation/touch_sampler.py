@@ -5,8 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from glotouch_bt.robot.description import Gripper
 from glotouch_bt.robot.geometry import Array
-from glotouch_bt.robot.observation import TactileFrame
+from glotouch_bt.robot.observation import GelImages, TactileFrame
 from glotouch_bt.robot.scene import Mesh
 
 Place = tuple[float, float, float]
@@ -21,11 +22,13 @@ class SampledClosure:
         aperture_m: Reported aperture.
         frame: Reported depth maps.
         place: Where the object stands afterwards: the jaws centre and align it.
+        images: Gel images, if they were asked for and the gripper takes them.
     """
 
     aperture_m: float
     frame: TactileFrame
     place: Place
+    images: GelImages | None = None
 
 
 class TouchSampler(ABC):
@@ -35,9 +38,11 @@ class TouchSampler(ABC):
 
     Attributes:
         names: The objects.
+        gripper: The hand that touches them.
     """
 
     names: tuple[str, ...]
+    gripper: Gripper
 
     @abstractmethod
     def solid(self, name: str) -> Mesh:
@@ -52,7 +57,13 @@ class TouchSampler(ABC):
         """Return the maps of pads that touch nothing."""
 
     @abstractmethod
-    def close(self, name: str, place: Place, hand: Place, height_m: float, force_N: float) -> SampledClosure | None:
+    def untouched_images(self) -> GelImages | None:
+        """Return gel images of pads that touch nothing, or None if the gripper takes none."""
+
+    @abstractmethod
+    def close(
+        self, name: str, place: Place, hand: Place, height_m: float, force_N: float, *, images: bool = False
+    ) -> SampledClosure | None:
         """Close the jaws once.
 
         Args:
@@ -61,6 +72,7 @@ class TouchSampler(ABC):
             hand: The pads' mid-point and the direction of x_P.
             height_m: Pads' mid-point above the floor.
             force_N: Closing force that the gripper is asked for.
+            images: Take gel images, too. They change neither the aperture nor the maps, of this closure or later ones.
 
         Returns:
             The closure, or None if a pad meets nothing or the object is wider than the jaws.

@@ -10,12 +10,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from glotouch_bt.robot import (
     Array,
     BackendError,
     BadInput,
     Command,
+    GelImages,
     GripperState,
     Limits,
     Observation,
@@ -44,6 +46,9 @@ CYCLES: Mapping[str, tuple[str | int, ...]] = {
 }  # fmt: skip
 TACTILE: Mapping[str, tuple[str | int, ...]] = {
     "stamp_s": (), "arrived_s": (), "left_m": ("rows", "columns"), "right_m": ("rows", "columns"),
+}  # fmt: skip
+IMAGES: Mapping[str, tuple[str | int, ...]] = {
+    "stamp_s": (), "arrived_s": (), "left": ("rows", "columns", 3), "right": ("rows", "columns", 3),
 }  # fmt: skip
 """Shape of one row of each column; words are sizes of the robot."""
 
@@ -89,6 +94,7 @@ class ReplayedRobot(Robot):
         description, limits, period_s: Of the recorded robot.
         samples, cycles, tactile: The record's columns (`report.RunRecord`); row 0 of `cycles` was sensed before the
             first command.
+        images, image_requests: Those of the record; empty if no gel images were requested.
         done_s: Robot clock at which each slow request was done, and its error, by its number.
 
     Raises:
@@ -103,6 +109,8 @@ class ReplayedRobot(Robot):
         samples: Mapping[str, Array],
         cycles: Mapping[str, Array],
         tactile: Mapping[str, Array],
+        images: Mapping[str, Array],
+        image_requests: Mapping[str, Array],
         done_s: Mapping[int, tuple[float, str | None]],
     ) -> None:
         self.description, self.limits, self.period_s = description, limits, period_s
@@ -111,13 +119,24 @@ class ReplayedRobot(Robot):
         if tactile:
             rows, columns = description.gripper.pad_shape
             _require_columns(tactile, TACTILE, {"rows": rows, "columns": columns}, "depth map")
+        if images:
+            rows, columns = description.gripper.camera.shape if description.gripper.camera else (0, 0)
+            _require_columns(images, IMAGES, {"rows": rows, "columns": columns}, "gel image")
+        if image_requests:
+            _require_columns(image_requests, {"stamp_s": ()}, {}, "request of gel images")
         counts = cycles["samples"]
         if not (np.isfinite(counts).all() and counts.min() >= 1 and counts.sum() <= len(samples["stamp_s"])):
             raise BadInput("its cycles and samples do not belong together")
         self._samples, self._cycles, self._tactile, self._done_s = samples, cycles, tactile, done_s
         self._ends = np.cumsum(cycles["samples"]).astype(np.int64)
-        frames = tactile["arrived_s"] if len(tactile) else np.zeros(0)
-        self._frame_of = np.searchsorted(cycles["stamp_s"], frames - 0.5 * period_s)
+        self._images = images
+
+        def cycles_of(columns: Mapping[str, Array], stamp: str) -> npt.NDArray[np.int64]:
+            stamps = columns[stamp] if columns else np.zeros(0)
+            return np.searchsorted(cycles["stamp_s"], stamps - 0.5 * period_s)
+
+        self._frame_of, self._images_of = cycles_of(tactile, "arrived_s"), cycles_of(images, "arrived_s")
+        self._images_asked = frozenset(cycles_of(image_requests, "stamp_s").tolist())
         self._wrench = np.ascontiguousarray(np.concatenate([samples["force_S_N"], samples["torque_S_Nm"]], axis=1))
         self._at = 0
         self._requests = 0
@@ -171,12 +190,17 @@ class ReplayedRobot(Robot):
             bool(c["gripper_moving"][i]),
         )
         frame: TactileFrame | None = None
-        at = int(np.searchsorted(self._frame_of, i))
-        if at < len(self._frame_of) and self._frame_of[at] == i:
+        if (at := _row_of(self._frame_of, i)) is not None:
             t = self._tactile
             frame = TactileFrame(float(t["stamp_s"][at]), t["left_m"][at], t["right_m"][at])
-        wrench_S = self._wrench[rows]
-        return Observation(s["stamp_s"], s["q"], s["dq"], s["position_B_P"], s["quat_B_P"], wrench_S, gripper, frame)
+        images: GelImages | None = None
+        if (at := _row_of(self._images_of, i)) is not None:
+            t = self._images
+            left, right = t["left"][at].astype(np.uint8), t["right"][at].astype(np.uint8)
+            images = GelImages(float(t["stamp_s"][at]), left, right)
+        return Observation(
+            s["stamp_s"], s["q"], s["dq"], s["position_B_P"], s["quat_B_P"], self._wrench[rows], gripper, frame, images
+        )
 
     def _difference(self, command: Command, i: int) -> str:
         """Return how a command differs from the recorded one of cycle i, in words; empty if it does not."""
@@ -202,7 +226,15 @@ class ReplayedRobot(Robot):
                     return f"the jaws' {name} is {is_:.6g}, it was {then:.6g}"
         if command.tactile != bool(c["command_tactile"][i]):
             return "only one requests depth maps"
+        if command.images != (i in self._images_asked):
+            return "only one requests gel images"
         return ""
+
+
+def _row_of(cycles: npt.NDArray[np.int64], i: int) -> int | None:
+    """Return the row of a column, of which each row belongs to the cycle in `cycles`, for cycle i."""
+    at = int(np.searchsorted(cycles, i))
+    return at if at < len(cycles) and cycles[at] == i else None
 
 
 class _Ticket:

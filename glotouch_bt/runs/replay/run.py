@@ -194,7 +194,10 @@ def replayed_robot(record: RunRecord) -> ReplayedRobot:
         if isinstance(e.data.get("number"), int)
     }
     try:
-        return ReplayedRobot(description, limits, period_s, record.samples, record.cycles, record.tactile, done)
+        return ReplayedRobot(
+            description, limits, period_s, record.samples, record.cycles, record.tactile, record.images,
+            record.image_requests, done,
+        )  # fmt: skip
     except BadInput as e:
         raise BadInput(f"{record.path}: {e}: it is damaged or of an older version") from e
 

@@ -14,6 +14,7 @@ from glotouch_bt.perception.touch import (
     estimate_object_motion,
     make_layer,
     pad_noise_m,
+    relief_of_closure,
 )
 from glotouch_bt.perception.touch.calibration import JawZero
 from glotouch_bt.robot import Array, Command, Gripper, GripperTarget, MotionRefused, Observation, Pose, TactileFrame
@@ -35,6 +36,9 @@ MAX_LEDGE_RATIO = 0.6
 Source: ours."""
 LOW_M = 0.03
 """Pads at most this high above the floor may close above a ledge of any object: it does not topple. Source: ours."""
+IMAGE_AFTER = 3
+"""Gel images are requested when the settling time over this has passed, so that they are taken on the plateau and
+arrive before its end. Source: ours."""
 UNTOUCHED_M = 0.002
 """The jaws touch nothing until they have closed by this. Source: ours, half of the smallest gap beside an object."""
 OPENING_M_S = 0.2
@@ -66,6 +70,11 @@ class ClosureParams(SkillParams):
     settle_s: float = param("Duration of measuring the plateau", unit="s", default=0.15, ge=0.05, le=1.0)
     top_overlap_m: float = param(
         "Highest layer: distance of the pad centre below the top", unit="m", default=0.008, ge=0.0, le=0.03
+    )
+    gel_images: bool = param(
+        "Take images of the gels in every closure, too: they tell apart objects that differ in fine relief",
+        needs="camera",
+        default=False,
     )
 
 
@@ -155,11 +164,15 @@ class Squeezing:
         p, arm = self._p, self._context.arm
         gripper = arm.description.gripper
         closing: list[Observation] = []
+        if p.gel_images:
+            closing.append((yield Command(tactile=True, images=True)))  # of the untouched gels
         yield from close_compliantly(arm, p.closing_speed_m_s, p.force_N, tactile=True, on_observation=closing.append)
         command = Command(gripper=GripperTarget(0.0, p.closing_speed_m_s, p.force_N), tactile=True)
         blocks: list[Observation] = []
-        for _ in range(round(p.settle_s / arm.period_s)):
-            blocks.append((yield command))  # noqa: PERF401 (a comprehension cannot yield)
+        periods = round(p.settle_s / arm.period_s)
+        for k in range(periods):
+            asked = p.gel_images and k == periods // IMAGE_AFTER
+            blocks.append((yield replace(command, images=True) if asked else command))
         contour = self.candidate.contour
         x_P = np.array([np.cos(self.yaw_K_rad), np.sin(self.yaw_K_rad)])
         middle = float(x_P @ (contour.centre_K_m - self.at.position_K_m))
@@ -178,6 +191,7 @@ class Squeezing:
             pad_shape=gripper.pad_shape,
             object_motion=object_motion,
             noise_m=noise_m,
+            relief=relief_of_closure(closing, blocks, gripper),
         )
         yield from release(arm, self.at.opening_m)
         true_m = layer.aperture_m - self._zero.error_m

@@ -72,7 +72,7 @@ class ScriptedVendor:
         self.flexivrdk = SimpleNamespace(
             __version__="1.9.4.1", Robot=Robot, Tool=ScriptedTool, ToolParams=ToolParams, Mode=Mode
         )
-        types = Enum("OutputType", {"Depth": 3, "TimeStamp": 17})
+        types = Enum("OutputType", {"Rectify": 1, "Depth": 3, "TimeStamp": 17})
         self.xensesdk = SimpleNamespace(Sensor=SimpleNamespace(OutputType=types, create=self._sensor))
         self.xensegripper = SimpleNamespace(XenseGripper=SimpleNamespace(create=lambda address: self.gripper))
 
@@ -224,6 +224,9 @@ class ScriptedGripper:
 
 IMAGE_MM = 1e-3 * np.arange(700)[:, None] + 1e-6 * np.arange(400)
 
+PICTURE = np.zeros((700, 400, 3), dtype=np.uint8) + np.array([1, 2, 3], dtype=np.uint8)
+PICTURE[:, 200:, 2] = 50  # more red in the right half
+
 
 class ScriptedSensor:
     """30 frames a second; row and column of a pixel are in its value."""
@@ -237,9 +240,10 @@ class ScriptedSensor:
 
     def selectSensorInfo(self, *types: Any) -> Any:
         if self.silent:
-            return None, None
+            return (None,) * len(types)
         stamp = np.floor(self._vendor.clock.now_s() * 30.0) / 30.0
-        return IMAGE_MM, stamp
+        given = {"Rectify": PICTURE, "Depth": IMAGE_MM, "TimeStamp": stamp}
+        return tuple(given[kind.name] for kind in types)
 
     def release(self) -> None:
         self.released = True

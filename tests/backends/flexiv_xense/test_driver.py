@@ -325,6 +325,17 @@ def test_frames_arrive_in_pairs_in_metres_with_one_mirrored(open_robot: Open) ->
     assert robot.cycle(HOLD).tactile is None
 
 
+def test_gel_images_come_once_a_request_with_the_right_one_mirrored(open_robot: Open) -> None:
+    robot = open_robot(ScriptedVendor())
+    seen = [robot.cycle(Command(tactile=True, images=k == 3)) for k in range(40)]
+    (images,) = (o.images for o in seen if o.images is not None)
+    assert images.left.shape == (*RIZON4_XENSE.gripper.camera.shape, 3)  # type: ignore[union-attr]
+    assert images.left[0, 0].tolist() == [3, 2, 1], "red, green, blue"
+    assert images.left[0, -1].tolist() == [50, 2, 1]
+    assert images.right[0, 0].tolist() == [50, 2, 1]
+    assert any(images.stamp_s == o.tactile.stamp_s for o in seen if o.tactile is not None)
+
+
 def test_missing_frames_are_a_fault_only_while_requested(open_robot: Open) -> None:
     vendor = ScriptedVendor()
     robot = open_robot(vendor)

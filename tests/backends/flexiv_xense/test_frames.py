@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glotouch_backends.flexiv_xense.client.chain import Chain
-from glotouch_backends.flexiv_xense.driver.frames import depth_map_m, payload_on_tool, wrench_map
+from glotouch_backends.flexiv_xense.driver.frames import depth_map_m, gel_image, payload_on_tool, wrench_map
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.robot import Pose
 from glotouch_bt.robot.fake import forward
@@ -69,6 +69,16 @@ def test_a_depth_map_in_millimetres_becomes_metres_by_cells() -> None:
     assert np.allclose(depth_map_m(image, (1, 2), False), [[0.002, 0.002]])
     assert np.allclose(depth_map_m(image, (2, 2), False), [[0.002, 0.0], [0.002, 0.004]])
     assert np.allclose(depth_map_m(image, (2, 2), True), [[0.0, 0.002], [0.004, 0.002]])
+
+
+def test_a_vendors_image_becomes_red_green_blue_by_cells() -> None:
+    blue, green, red = (np.full((2, 4), v) for v in (10, 20, 30))
+    red[:, 2:] = 31
+    green[0] = 30
+    image = np.stack([blue, green, red], axis=-1).astype(np.uint8)
+    assert gel_image(image, (1, 2), False).tolist() == [[[30, 25, 10], [31, 25, 10]]]
+    assert gel_image(image, (2, 2), True).tolist() == [[[31, 30, 10], [30, 30, 10]], [[31, 20, 10], [30, 20, 10]]]
+    assert gel_image(np.zeros((5, 7, 3), np.uint8), (2, 3), False).shape == (2, 3, 3)
 
 
 def test_dead_pixels_are_left_out() -> None:

@@ -125,3 +125,21 @@ def test_frames_are_simulated_only_while_a_sensor_is_read(bench: SimulatedVendor
     assert 50 <= len(stamps - {None}) <= 62
     sleep(bench, 1.0)
     assert EPOCH_S + bench.clock.now_s() - pad.selectSensorInfo(kinds.TimeStamp) > 0.8
+
+
+def test_an_image_is_rendered_after_it_was_asked_for(bench: SimulatedVendor) -> None:
+    """Blue, green, red of an untouched gel; depth, image and stamp of one call are of one frame."""
+    output = bench.xensesdk.Sensor.OutputType
+    sensors = [bench.xensesdk.Sensor.create(serial) for serial in PAD_SNS]
+    asked = (output.Depth, output.Rectify, output.TimeStamp)
+    for _ in range(20):
+        sleep(bench, 0.005)
+        found = [sensor.selectSensorInfo(*asked) for sensor in sensors]
+        if all(image is not None for _, image, _ in found):
+            break
+    for _, image, stamp in found:
+        assert (image.shape, image.dtype) == ((700, 400, 3), np.uint8)
+        assert stamp == EPOCH_S + bench.gripper.hand.images.stamp_s
+        assert np.ptp(image) == 0, "no noise, nothing touched, and equal lights"
+    sleep(bench, 0.1)
+    assert bench.gripper.hand.images.stamp_s == pytest.approx(stamp - EPOCH_S), "no further one without a request"

@@ -57,7 +57,23 @@ def press_floor(robot: MujocoRobot, drive: Drive) -> list[Observation]:
     return observations
 
 
-MOTIONS = {**dict.fromkeys(PROBE_AXES, "push_probe"), "housing_softness_s": "press_floor"}
+def photograph(robot: MujocoRobot, drive: Drive) -> list[Observation]:
+    """Squeeze the block and take an image of the pads."""
+    driver = drive(robot)
+    driver.jaws(0.070, time_s=0.3)
+    driver.line((0.63, 0.08, -0.165), speed_m_s=0.2)
+    driver.wait(0.6, Command(gripper=GripperTarget(0.020, 0.1, 10.0), tactile=True))
+    driver.wait(robot.period_s, Command(images=True))
+    driver.wait(0.1)
+    observations: list[Observation] = driver.observations
+    return observations
+
+
+MOTIONS = {
+    **dict.fromkeys(PROBE_AXES, "push_probe"),
+    "housing_softness_s": "press_floor",
+    **{axis: "photograph" for axis in AXES if axis.startswith("image_")},
+}
 """Motions in which an axis' sensor is used; `squeeze` for all others."""
 
 

@@ -99,7 +99,7 @@ def test_layouts_that_cannot_be_acquired_are_rows(quick, monkeypatch, tmp_path):
 
 def test_touches_without_a_robot_are_written_like_acquired_ones(quick, monkeypatch, tmp_path):
     monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
-    monkeypatch.setattr(bench, "sampled_layout", lambda backend, world, conditions, seed: a_layout(seed))
+    monkeypatch.setattr(bench, "sampled_layout", lambda backend, world, conditions, seed, images: a_layout(seed))
     with ThreadPoolExecutor(1) as pool:
         summary = run_campaign(campaign(tmp_path, sampled=True), pool)
     assert (summary["sampled"], summary["methods"]["likelihood"]["row_top1"]["n"]) == (True, 6)
@@ -195,7 +195,7 @@ def test_options_that_need_touches_without_a_robot(changes, tmp_path):
 
 def test_a_handled_object_is_compared_with_its_stl(quick, monkeypatch, tmp_path):
     monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
-    monkeypatch.setattr(bench, "sampled_layout", lambda backend, world, conditions, seed: a_layout(seed))
+    monkeypatch.setattr(bench, "sampled_layout", lambda backend, world, conditions, seed, images: a_layout(seed))
     handled = {t.name: t.touchset for t in a_layout(3).touched}
     monkeypatch.setattr(bench, "handled_objects", lambda *_: handled)
     seen = []

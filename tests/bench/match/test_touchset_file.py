@@ -36,8 +36,9 @@ def a_touchset(
         left[rng.random(pad) < 0.1] = np.nan
         xy, yaw = rng.normal(0, 0.1, 2), float(rng.normal())
         why = str(rng.choice(["", "the aperture still moved"]))
+        relief = rng.random((2, 2, 7, 5)) if rng.random() < 0.5 else None
         width, rests = float(rng.normal(0.05, 0.01)), bool(rng.random() < 0.5)
-        return Layer(0.02, width, xy, yaw, left, right, 9.75, rests, why, slide_m=float(rng.normal()))
+        return Layer(0.02, width, xy, yaw, left, right, 9.75, rests, why, slide_m=float(rng.normal()), relief=relief)
 
     contour = Contour(
         "box", rng.normal(0, 0.1, 2), (0.07, 0.04), float(rng.normal()), 3e-4, rng.normal(0, 1e-3, contacts), "free",

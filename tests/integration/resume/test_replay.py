@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from glotouch_bt.commands.replay import replay as replay_command
 from glotouch_bt.mission.execution.control import Control
 from glotouch_bt.report import read_run
 from glotouch_bt.report.run_record import RecordedEvent
-from glotouch_bt.robot import HOLD, BadInput, Command
+from glotouch_bt.robot import HOLD, BadInput, Command, GripperTarget, JointSetpoint
 from glotouch_bt.runs.launch import RunRequest, launch
 from glotouch_bt.runs.replay.compare import compare_events, compare_ticks
 from glotouch_bt.runs.replay.robot import RecordEnded
@@ -149,3 +150,36 @@ def test_a_paused_run_is_replayed_with_its_pauses(tmp_path: Path) -> None:
     again = replay(done.folder)
     assert again.divergence is None
     assert again.same
+
+
+def test_gel_images_are_replayed_where_they_arrived(folder: Path) -> None:
+    """The robot gives the recorded pixels in their cycle; a request that was or is not made is a divergence."""
+    record = read_run(folder)
+    robot = replayed_robot(record)
+    stamps = record.cycles["stamp_s"]
+    shape = (1, *robot.description.gripper.camera.shape, 3)  # type: ignore[union-attr]
+    left, right = np.random.default_rng(0).integers(0, 256, (2, *shape)).astype(float)
+    record.images = {"stamp_s": stamps[1:2], "arrived_s": stamps[3:4], "left": left, "right": right}
+    robot = replayed_robot(record)
+    seen = [robot.cycle(HOLD).images for _ in range(4)]
+    assert [o is not None for o in seen] == [False, False, True, False]
+    assert np.array_equal(seen[2].left, left[0])
+    assert np.array_equal(seen[2].right, right[0])
+    record.image_requests = {"stamp_s": stamps[1:2]}
+    asked, silent = replayed_robot(record), replayed_robot(record)
+    row = {name.removeprefix("command_"): column[1] for name, column in record.cycles.items()}
+    motion = None
+    if not np.isnan(row["q"][0]):
+        motion = JointSetpoint(row["q"], row["dq"], np.zeros_like(row["q"]), robot.observe().pose_B_P)
+    jaws = None
+    if not np.isnan(row["aperture_m"]):
+        jaws = GripperTarget(float(row["aperture_m"]), float(row["speed_m_s"]), float(row["force_N"]))
+    first = Command(motion, jaws, tactile=bool(row["tactile"]), images=True)
+    asked.cycle(first)
+    silent.cycle(replace(first, images=False))
+    assert asked.divergence is None
+    assert silent.divergence is not None
+    assert "gel images" in silent.divergence.what
+    record.images["left"] = left[:, :-1]
+    with pytest.raises(BadInput, match="gel image"):
+        replayed_robot(record)

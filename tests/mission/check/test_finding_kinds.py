@@ -11,7 +11,8 @@ import pytest
 import trimesh
 from typer.testing import CliRunner
 
-from glotouch_bt import check
+from glotouch_backends import robots
+from glotouch_bt import check, run
 from glotouch_bt.cli import app
 from glotouch_bt.faults import read_plan
 from glotouch_bt.mission import load_mission
@@ -60,7 +61,7 @@ EXAMPLES = {
 }
 ELSEWHERE = {
     "unreadable", "unusable_skill", "unknown_fault", "unknown_node", "no_layout", "target_out_of_reach",
-    "box_out_of_reach",
+    "box_out_of_reach", "missing_part",
 }  # fmt: skip
 """Kinds that no mission text alone can raise; the tests at the end of this file raise them."""
 
@@ -168,6 +169,24 @@ def test_box_out_of_reach(robot: str, tmp_path: Path) -> None:
     assert "container" in said[0]
     assert "cannot be reached" in said[0]
     assert not [f for f in check("retrieve", {"robot": robot}) if f.code == "box_out_of_reach"]
+
+
+def test_missing_part(tmp_path: Path) -> None:
+    """Images asked of a gripper without cameras are found by `check` and refused by `run`, before anything moves."""
+    files = Path(robots.__file__).parent
+    written = (files / "rizon4.yaml").read_text().replace("urdf: ", f"urdf: {files}/")
+    (tmp_path / "blind.yaml").write_text("\n".join(l for l in written.splitlines() if "camera:" not in l))
+    mission = tmp_path / "m.yaml"
+    text = (shipped_root() / "remember.yaml").read_text()
+    mission.write_text(text.replace("{max_closures: $max_closures}", "{max_closures: 4, gel_images: true}"))
+    settings = {"robot": str(tmp_path / "blind.yaml")}
+    with pytest.raises(BadInput, match="has no camera"):
+        run(mission, out=tmp_path / "run", robot=settings["robot"])
+    found = [f for f in check(str(mission), settings) if f.code == "missing_part"]
+    (what,) = (f.what for f in found)
+    assert what.startswith("gel_images: the gripper of Flexiv Rizon 4")
+    assert what.endswith("has no camera")
+    assert not [f for f in check(str(mission)) if f.code == "missing_part"]
 
 
 @pytest.mark.parametrize("count", [1, 3, 8])

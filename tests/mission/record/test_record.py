@@ -2,7 +2,7 @@
 
 import base64
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -17,10 +17,12 @@ from glotouch_bt.mission.record.mcap_json import dumps, to_json
 from glotouch_bt.mission.record.mcap_packing import Column, pack, unpack
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.perception.touch.values import Contact
+from glotouch_bt.report import read_run
 from glotouch_bt.robot import (
     HOLD,
     BadInput,
     Command,
+    GelImages,
     GlotouchError,
     GripperState,
     GripperTarget,
@@ -154,6 +156,25 @@ def test_depth_maps_come_back_packed_and_as_images(tmp_path: Path) -> None:
     pixels = np.frombuffer(base64.b64decode(image["data"]), "<f4").reshape(6, 4)
     np.testing.assert_allclose(pixels, frames[0].left_m, atol=0.51e-6)
     assert 1 <= len(found["/tactile/left"]) < len(frames)
+
+
+def test_gel_images_come_back_and_cost_nothing_without_a_request(tmp_path: Path) -> None:
+    """The record of a run without images does not mention them; with them, every pixel comes back."""
+    made = write(tmp_path / "plain.mcap", n=12)
+    assert not {t for t in messages(tmp_path / "plain.mcap") if "image" in t}
+    rng = np.random.default_rng(0)
+    left, right = rng.integers(0, 256, (2, 21, 10, 3)).astype(np.uint8)
+    images = GelImages(made[5][0].now_s - 0.0123, left, right)
+    with Recorder(tmp_path / "run.mcap", {}) as recorder:
+        for i, (o, c) in enumerate(made):
+            seen = replace(o, images=images if i == 5 else None)
+            recorder.block(seen, replace(c, images=i in (2, 9)))
+    record = read_run(tmp_path / "run.mcap")
+    np.testing.assert_array_equal(record.images["left"], [left])
+    np.testing.assert_array_equal(record.images["right"], [right])
+    assert record.images["stamp_s"] == pytest.approx([images.stamp_s], abs=1e-7)
+    assert record.images["arrived_s"] == pytest.approx([made[5][0].now_s], abs=1e-7)
+    assert record.image_requests["stamp_s"] == pytest.approx([made[i][0].now_s for i in (2, 9)], abs=1e-7)
 
 
 def test_plots_hold_the_newest_sample_of_every_fourth_cycle(tmp_path: Path) -> None:

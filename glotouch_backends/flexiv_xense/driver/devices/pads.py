@@ -1,7 +1,7 @@
 """The two tactile sensors: pairs of depth maps taken together, in metres; missing and late frames.
 
 A read takes as long as the sensor's own processing. Reads therefore run concurrently with the loop, and only while
-frames are requested.
+frames are requested. Gel images are read on request only, in the same call as the depth map.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 
 from ..clock import Clock
 from ..faults import DeviceFault, vendor_call
-from ..frames import Array, depth_map_m
-from ..messages import HandLimits, Maps
+from ..frames import Array, depth_map_m, gel_image
+from ..messages import HandLimits, Images, Maps
 
 LEFT, RIGHT = 0, 1
 MAX_SAME_CLOCK_S = 1.0
@@ -50,19 +50,24 @@ class TactileSensors:
         sdk: The vendor's module.
         sensors: Left and right, from `open_sensor`.
         clock: Time.
-        limits: Shape of the maps.
+        limits: Shapes of the maps and the images.
         mirror: Pad whose columns run along -x_P.
     """
 
     def __init__(self, sdk: Any, sensors: tuple[Any, Any], clock: Clock, limits: HandLimits, mirror: str) -> None:
         self._sensors, self._clock = sensors, clock
         self._shape = limits.pad_shape
+        self._image_shape = limits.image_shape
         self._types = sdk.Sensor.OutputType.Depth, sdk.Sensor.OutputType.TimeStamp
+        self._image_type = sdk.Sensor.OutputType.Rectify
         self._mirrored = mirror == "left", mirror == "right"
         self._lateness = [math.inf, math.inf]
         self._last = [-math.inf, -math.inf]
         self._maps: list[Array | None] = [None, None]
         self._stamps = [-math.inf, -math.inf]
+        self._pictures: list[bytes | None] = [None, None]
+        self._image_due = False
+        self._newest_images: Images | None = None
         self._requested_s = -math.inf
         self._reading = False
         self._newest: Maps | None = None
@@ -79,6 +84,15 @@ class TactileSensors:
         if not self._reading and not self._closed:
             self._reading = True
             self._clock.spawn(self._read_while_requested)
+
+    def request_images(self) -> None:
+        """Request one pair of gel images, while frames are requested; without a shape for them, none come."""
+        self._image_due = self._image_shape is not None
+
+    def take_images(self) -> Images | None:
+        """Return a new pair of gel images once, or None."""
+        newest, self._newest_images = self._newest_images, None
+        return newest
 
     def take(self) -> Maps | None:
         """Return a new pair once, or None.
@@ -111,7 +125,8 @@ class TactileSensors:
     def _read(self, side: int) -> None:
         """Read one sensor; only one call for both gives depth and stamp of the same frame."""
         with vendor_call(f"reading the {('left', 'right')[side]} tactile sensor", "link"):
-            depth, stamp = self._sensors[side].selectSensorInfo(*self._types)
+            types = (*self._types, self._image_type) if self._image_due else self._types
+            depth, stamp, *pictures = self._sensors[side].selectSensorInfo(*types)
             if depth is None or stamp is None:
                 return
             taken = float(stamp)
@@ -120,6 +135,9 @@ class TactileSensors:
             self._last[side] = taken
             taken = self._on_our_clock(side, taken)
             self._maps[side] = depth_map_m(depth, self._shape, self._mirrored[side])
+            self._pictures[side] = None
+            if self._image_shape is not None and pictures and pictures[0] is not None:
+                self._pictures[side] = gel_image(pictures[0], self._image_shape, self._mirrored[side]).tobytes()
             self._stamps[side] = taken
 
     def _on_our_clock(self, side: int, stamp_s: float) -> float:
@@ -139,6 +157,11 @@ class TactileSensors:
         stamp = 0.5 * (self._stamps[LEFT] + self._stamps[RIGHT])
         self._maps = [None, None]
         self._newest = Maps(stamp, *self._shape, _bytes(left), _bytes(right))
+        left_image, right_image = self._pictures
+        if self._image_shape is not None and left_image is not None and right_image is not None:
+            self._newest_images = Images(stamp, *self._image_shape, left_image, right_image)
+            self._image_due = False
+        self._pictures = [None, None]
         self._newest_s = self._clock.now_s()
 
     def release(self) -> None:

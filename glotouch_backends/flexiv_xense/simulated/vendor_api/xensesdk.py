@@ -1,8 +1,9 @@
-"""Stand-in for the vendor's `xensesdk`: Depth (700, 400) in mm, positive indented.
+"""Stand-in for the vendor's `xensesdk`: Depth (700, 400) in mm, positive indented, and Rectify (700, 400, 3), BGR.
 
 A sensor sees its gel from behind, with rows towards the fingertip. So the columns of the LEFT pad run along +x_P and
-those of the RIGHT pad along -x_P (ASSUMED: both sensors are mounted alike). Only Depth and TimeStamp are simulated;
-every other output is None, as an unavailable one is with the real sensor.
+those of the RIGHT pad along -x_P (ASSUMED: both sensors are mounted alike). Only Depth, Rectify and TimeStamp are
+simulated; every other output is None, as an unavailable one is with the real sensor. An image is rendered only after it
+was asked for; until then it is None.
 """
 
 from __future__ import annotations
@@ -132,10 +133,14 @@ class Sensor:
         values: list[Any] = []
         for kind in output_types:
             known = self.OutputType[kind] if isinstance(kind, str) else kind
-            if found is None or known not in (self.OutputType.Depth, self.OutputType.TimeStamp):
+            if link is None or found is None:
                 values.append(None)
+            elif known is self.OutputType.Depth:
+                values.append(found[1])
+            elif known is self.OutputType.TimeStamp:
+                values.append(EPOCH_S + found[0])
             else:
-                values.append(found[1] if known is self.OutputType.Depth else EPOCH_S + found[0])
+                values.append(_rectified(link, found[0]) if known is self.OutputType.Rectify else None)
         return values[0] if len(values) == 1 else tuple(values)
 
     def _read(self, link: PadLink) -> tuple[float, Floats] | None:
@@ -155,3 +160,17 @@ class Sensor:
     def release(self) -> None:
         """Close the sensor."""
         self._link = None
+
+
+def _rectified(link: PadLink, stamp_s: float) -> npt.NDArray[np.uint8] | None:
+    """Return the image (700, 400, 3) of the frame with this stamp; if it was not rendered, have the next one rendered.
+
+    None for a hand without cameras.
+    """
+    images = link.hand.images
+    if images is None or images.stamp_s != stamp_s:
+        link.hand.want_images()
+        return None
+    image = images.right[:, ::-1] if link.right else images.left
+    times = SHAPE[0] // image.shape[0], SHAPE[1] // image.shape[1]
+    return np.ascontiguousarray(np.repeat(np.repeat(image, times[0], axis=0), times[1], axis=1)[:, :, ::-1])

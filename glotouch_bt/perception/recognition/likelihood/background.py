@@ -97,15 +97,22 @@ def log_generic_images(layers: tuple[LayerEvidence, ...], pad: PadSpec, p: Likel
             at = place.get((e.sequence, e.index, side))
             if at is None:
                 continue
-            beside = [(e.sequence, e.index - 1, side), (e.sequence - 1, e.index, side)]
-            if side == 1:
-                beside.append((e.sequence, e.index, 0))
-            guesses = [float(alike[at, place[k]]) for k in beside if k in place]
-            density = float(anything[at])
-            if guesses:
-                density = (1 - p.image_alike) * density + p.image_alike * sum(guesses) / len(guesses)
-            out[i, side] = math.log(density + 1e-12)
+            guesses = [float(alike[at, place[k]]) for k in neighbours_of(e, side) if k in place]
+            out[i, side] = math.log(mixed_density(float(anything[at]), guesses, p) + 1e-12)
     return out
+
+
+def neighbours_of(e: LayerEvidence, side: int) -> list[tuple[int, int, int]]:
+    """Return the keys (sequence, index, pad) of earlier images that resemble an image on any object."""
+    beside = [(e.sequence, e.index - 1, side), (e.sequence - 1, e.index, side)]
+    return [*beside, (e.sequence, e.index, 0)] if side == 1 else beside
+
+
+def mixed_density(anything: float, guesses: list[float], p: LikelihoodParams) -> float:
+    """Return the background density of an image: of any surface, and of those like the `guesses` of its neighbours."""
+    if not guesses:
+        return anything
+    return (1 - p.image_alike) * anything + p.image_alike * sum(guesses) / len(guesses)
 
 
 def mean_squared(a: Array32, b: Array32) -> Array32:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from glotouch_bt.perception.recognition.evidence import Evidence, read_evidence
 from glotouch_bt.perception.recognition.likelihood.background import log_generic_images, log_generic_widths
 from glotouch_bt.perception.recognition.likelihood.bands import Residual, log_banded_twin, residual
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.perception.recognition.likelihood.relief import LikelyPose, log_generic_reliefs, relief_ratio
 from glotouch_bt.perception.recognition.likelihood.scalars import (
     contour_ratio,
     height_ratio,
@@ -40,6 +42,9 @@ _read: deque[tuple[TouchSet, PadSpec, LikelihoodParams, TouchSetReading]] = dequ
 PRUNE_NATS = 5.0
 """A hypothesis is left out if its outline and height are less likely than the best one's by more than this, nats.
 Source: ours; its closures would have to fit e^5 times better."""
+HOPELESS_NATS = -10.0
+"""No relief is predicted for a target of which the log ratio is below this without it: relief could not make up for it.
+Source: ours."""
 PARALLEL_RAD = math.radians(10.0)
 """Maximum yaw difference (modulo half a turn) of parallel tracks."""
 
@@ -68,7 +73,7 @@ class Pair:
         log_ratio: log p(TouchSet | target) - log p(TouchSet | random object), tempered and calibrated.
         log_twin: log p(TouchSet | twin) - log p(TouchSet | target), from the widths, calibrated.
         terms: Terms of the ratio, nats before calibration: mode, height, contour; width and image at the best pose;
-            pose: effect of the marginalisation over the pose.
+            pose: effect of the marginalisation over the pose; relief: only with gel images.
         log_pose: (72, nz) posterior of (relative yaw of the first sequence, height offset); None without contact.
         first_rad: Yaw of the first sequence's hand.
         bias_m: Best aperture bias.
@@ -103,9 +108,10 @@ def _read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> Tou
     e = read_evidence(touchset, pad)
     images = log_generic_images(e.layers, pad, p)
     widths = log_generic_widths(e.layers, touchset.candidate, p)
+    reliefs = log_generic_reliefs(e.layers, p)
     seen: dict[int, list[Observed]] = {}
-    for layer, width, image in zip(e.layers, widths, images, strict=True):
-        seen.setdefault(layer.sequence, []).append(Observed(layer, float(width), (float(image[0]), float(image[1]))))
+    for layer, width, image, relief in zip(e.layers, widths, images.tolist(), reliefs.tolist(), strict=True):
+        seen.setdefault(layer.sequence, []).append(Observed(layer, float(width), tuple(image), tuple(relief)))
     return TouchSetReading(touchset, e, tuple(tuple(v) for _, v in sorted(seen.items())))
 
 
@@ -191,9 +197,7 @@ def _compare(
     shifts = np.zeros(len(touchset.sequences))
     terms["width"] = terms["image"] = 0.0
     for seen, (widths, images, volume, flip, offs) in zip(reading.sequences, parts, strict=True):
-        along = volume[b, i, :, z] + (np.log(slide[:, c]) if parallel else 0)
-        d = int(np.argmax(along))
-        d = len(grid.shift_m) - 1 - d if parallel and flip else d
+        d = _best_shift(volume, slide if parallel else None, flip, (b, i, c, z))
         shifts[seen[0].layer.sequence] = grid.shift_m[d]
         terms["width"] += float(widths[b, i, d, z])
         terms["image"] += float(images[i, d, z])
@@ -203,6 +207,22 @@ def _compare(
     log_twin = p.twin_slope * 0.5 * (by_places + by_bands)
     terms["pose"] = total - terms["width"] - terms["image"]
     log_pose = log_sum(joint, (0, 2))
+    if _has_relief(reading) and p.offset + p.slope * sum(terms.values()) > HOPELESS_NATS:
+
+        def shifts_at(at: tuple[int, int, int, int]) -> Array:
+            found = np.zeros(len(touchset.sequences))
+            for seen, (_, _, volume, flip, _) in zip(reading.sequences, parts, strict=True):
+                d = _best_shift(volume, slide if parallel else None, flip, at)
+                found[seen[0].layer.sequence] = grid.shift_m[d]
+            return found
+
+        poses = _likely_poses(model, joint, log_pose, grid, shifts_at, p.relief_poses)
+        layers = [
+            (o.layer, float(turn), o.log_reliefs)
+            for seen, turn in zip(reading.sequences, turns, strict=True)
+            for o in seen
+        ]
+        terms["relief"] = relief_ratio(model, layers, poses, p)
     yaw = _refined(log_sum(log_pose, 1), i)
     fit, pose = fitted_pose(
         model, touchset, reading.evidence, yaw, shifts, float(grid.z0_m[z]), 1.0, float(grid.bias_m[b])
@@ -212,6 +232,41 @@ def _compare(
         candidate.index, ratio, log_twin, terms, np.asarray(log_pose - total, dtype=np.float32), first,
         float(grid.bias_m[b]), fit, pose, reading.evidence.weight, hypothesis,
     )  # fmt: skip
+
+
+def _best_shift(volume: Array32, slide: Array32 | None, flip: bool, at: tuple[int, int, int, int]) -> int:
+    """Return the index of a sequence's likeliest shift at (bias, yaw, common shift, height offset).
+
+    `slide` is the probability of a sequence's shift given the common one of parallel tracks; None if they are not.
+    """
+    b, i, c, z = at
+    along = volume[b, i, :, z] + (0 if slide is None else np.log(slide[:, c]))
+    d = int(np.argmax(along))
+    return volume.shape[2] - 1 - d if slide is not None and flip else d
+
+
+def _has_relief(reading: TouchSetReading) -> bool:
+    return any(o.layer.relief is not None for seen in reading.sequences for o in seen)
+
+
+def _likely_poses(
+    model: TargetModel,
+    joint: Array32,
+    log_pose: Array32,
+    grid: Grid,
+    shifts_at: Callable[[tuple[int, int, int, int]], Array],
+    count: int,
+) -> list[LikelyPose]:
+    """Return the `count` likeliest pairs of yaw and height offset, each with its likeliest shifts."""
+    best = np.argsort(-log_pose, axis=None, kind="stable")[:count]
+    weights = np.exp(log_pose.reshape(-1)[best] - log_pose.max()).astype(np.float64)
+    poses = []
+    for k, weight in zip(best.tolist(), (weights / weights.sum()).tolist(), strict=True):
+        i, z = divmod(k, log_pose.shape[1])
+        b, c = divmod(int(np.argmax(joint[:, i, :, z])), joint.shape[2])
+        shift_m = shifts_at((b, i, c, z))
+        poses.append(LikelyPose(weight, float(model.phi_rad[i]), float(grid.z0_m[z]), shift_m))
+    return poses
 
 
 def observed_turns(touchset: TouchSet) -> list[float]:

@@ -32,6 +32,10 @@ class LikelihoodParams:
         image_order: Half the effective number of independent blocks of an image.
         image_outlier: Probability of an outlier image.
         image_alike: Background probability that an image resembles a neighbouring one.
+        relief_scale: Feature distance (RMS over 70 blocks) that scales the kernel of a gel image's relief.
+        relief_order: Half the effective number of independent blocks of a relief.
+        relief_outlier: Probability of an outlier relief.
+        relief_poses: Number of likely poses at which the relief is predicted.
         height_sd_m: Standard deviation of the measured top.
         lean_rad: Mean lean of an object that stands on an uneven base, exponentially distributed. Source: REALISM, 0 to
             3 deg, at most 8 deg.
@@ -40,8 +44,8 @@ class LikelihoodParams:
         contour_sd_m: Standard deviation of a contour's side, besides that of the traces.
         contour_outlier: Probability that the contour covers only a part of the object.
         yaw_sd_rad: Standard deviation of a box contour's direction.
-        temper_outline, temper_width, temper_image: Tempering exponents of outline and height, widths and images for
-            correlated observations; 0 leaves a part out (`ablation`).
+        temper_outline, temper_width, temper_image, temper_relief: Tempering exponents of outline and height, widths,
+            depth maps and gel images for correlated observations; 0 leaves a part out (`ablation`).
         slope, offset: Calibration: log odds against the background = offset + slope * summed log ratios.
         outline_offset: The same offset for a candidate of which only outline and height were measured.
         prior_absent: Prior probability that the target is none of the candidates.
@@ -74,6 +78,10 @@ class LikelihoodParams:
     image_order: float = 3.0
     image_outlier: float = 0.05
     image_alike: float = 0.6
+    relief_scale: float = 0.4
+    relief_order: float = 3.0
+    relief_outlier: float = 0.05
+    relief_poses: int = 3
     height_sd_m: float = 1.2e-3
     lean_rad: float = math.radians(3.0)
     height_lower: float = 0.03
@@ -83,6 +91,7 @@ class LikelihoodParams:
     temper_outline: float = 1.0
     temper_width: float = 0.5
     temper_image: float = 0.35
+    temper_relief: float = 0.35
     slope: float = 0.75
     offset: float = -1.5
     outline_offset: float = -1.0
@@ -99,15 +108,13 @@ class LikelihoodParams:
             v = getattr(self, f.name)
             if not math.isfinite(v) or (v < 0 and not f.name.endswith("offset")):
                 raise ParamError(f"likelihood.{f.name}", v, "finite and not negative")
-            if (
-                f.name.endswith(("_sd_m", "_sd_rad", "_range_m", "lean_rad")) or f.name.startswith("image_s")
-            ) and v == 0:
+            if f.name.endswith(("_sd_m", "_sd_rad", "_range_m", "lean_rad", "_scale", "_poses")) and v == 0:
                 raise ParamError(f"likelihood.{f.name}", v, "positive")
             if f.name.endswith("_steps") and v % 2 == 0:
                 raise ParamError(f"likelihood.{f.name}", v, "odd, so that the grid contains zero")
         for name in (
-            "width_outlier", "slip", "image_outlier", "image_alike", "height_lower", "contour_outlier", "prior_absent",
-            "twin", "twin_width",
+            "width_outlier", "slip", "image_outlier", "image_alike", "relief_outlier", "height_lower",
+            "contour_outlier", "prior_absent", "twin", "twin_width",
         ):  # fmt: skip
             if not 0 < getattr(self, name) < 1:
                 raise ParamError(f"likelihood.{name}", getattr(self, name), "between 0 and 1")

@@ -45,11 +45,12 @@ class Grid:
 
 @dataclass(frozen=True)
 class Observed:
-    """One layer with its background log densities of width and (left, right) images."""
+    """One layer with its background log densities of width, (left, right) images and (left, right) reliefs."""
 
     layer: LayerEvidence
     log_width: float
     log_images: tuple[float, float]
+    log_reliefs: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)

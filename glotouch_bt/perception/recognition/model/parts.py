@@ -67,7 +67,7 @@ def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32
             name=name, digest=str(facts["digest"]), pad=pad, phi_rad=phi, l_m=l, z_m=z, reach_m=arrays["reach_m"],
             fine_m=arrays["fine_m"], outline=outline, components=tuple(components),
             centre_m=np.array(facts["centre_m"], dtype=np.float64), tops_m=np.array(facts["tops_m"], dtype=np.float64),
-            sides=(), certainty=None, **numbers, _lazy=lazy,
+            sides=(), certainty=None, mesh=None, **numbers, _lazy=lazy,
         )  # fmt: skip
     except (KeyError, TypeError, ValueError) as e:
         raise ParamError("model parts", type(e).__name__, "complete") from e

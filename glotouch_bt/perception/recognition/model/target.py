@@ -89,6 +89,7 @@ class TargetModel:
         anisotropy: 1 - short / long of the footprint's minimum-area rectangle (the paper's a_M).
         sides: The sides on which the object may stand, each with a model of its own; empty if only as in its file.
         certainty: How well the tables are known; None if they follow from a mesh. Without a mesh, `fine_m` is empty.
+        mesh: The mesh, for predictions that no table holds; None if the target is known only by touch.
     """
 
     name: str
@@ -110,6 +111,7 @@ class TargetModel:
     components: tuple[Outline, ...] = ()
     sides: tuple[TargetHypothesis, ...] = ()
     certainty: Certainty | None = None
+    mesh: Mesh | None = None
     _lazy: dict[str, Array32] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -282,5 +284,5 @@ def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
     return TargetModel(
         mesh.name, mesh.digest, pad, axes.phi_rad, axes.l_m, axes.z_m, reach, fine, outline, axes.centre_m,
         axes.height_m, tops_within(solid, axes.radius_m), rho, rho_sd, dispersion, axes.anisotropy,
-        component_outlines(solid),
+        component_outlines(solid), mesh=mesh,
     )  # fmt: skip

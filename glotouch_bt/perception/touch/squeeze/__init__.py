@@ -12,3 +12,9 @@ from glotouch_bt.perception.touch.squeeze.patches import (
     temporal_median,
 )
 from glotouch_bt.perception.touch.squeeze.plateau import find_plateau, make_layer
+from glotouch_bt.perception.touch.squeeze.relief import (
+    BLOCKS,
+    relief_of_closure,
+    relief_of_images,
+    relief_of_surface,
+)

@@ -93,6 +93,7 @@ def make_layer(
     pad_shape: tuple[int, int],
     object_motion: ObjectMotion | None = None,
     noise_m: tuple[float, float] = (PAD_NOISE_M, PAD_NOISE_M),
+    relief: Array | None = None,
 ) -> Layer:
     """Build a `Layer` from one closure: aperture and force on the plateau, median maps of the frames TAKEN during it.
 
@@ -104,7 +105,7 @@ def make_layer(
         force_N: Commanded jaw force.
         pad_shape: (rows, cols) of the maps.
         object_motion: Motion of the object during the closure, if estimated.
-        noise_m: As in `Layer`.
+        noise_m, relief: As in `Layer`.
 
     Raises:
         ParamError: No blocks, or maps of another shape.
@@ -128,4 +129,5 @@ def make_layer(
         turn_rad=math.nan if object_motion is None else object_motion.turn_rad,
         compliance_m=math.nan if object_motion is None else object_motion.compliance_m,
         noise_m=noise_m,
+        relief=relief,
     )
