@@ -69,6 +69,22 @@ def test_what_the_jaws_handled_is_forgotten() -> None:
     assert felt.free_down_to(np.array([[0.25, 0.0]]), 0.005) == 0.0
 
 
+def test_what_a_fingertip_met_is_kept_until_jaws_close_near_it() -> None:
+    felt, other = FeltSpace(), FeltSpace()
+    places = np.array([[0.0, 0.0], [0.005, 0.0], [0.010, 0.0], [0.015, 0.0]])
+    assert felt.met_below(places, 0.0) is None
+    felt.add_met(places, 0.04)
+    felt.forget_free_near(places[0])
+    other.restore(felt.state())
+    for record in (felt, other):
+        assert record.met_below(places, 0.02) == 0.04
+        assert record.met_below(places, 0.05) is None, "it stays above"
+        assert record.met_below(places + [0.0, 0.003], 0.02) == 0.04
+        assert record.met_below(places + [0.016, 0.0], 0.02) is None, "it covers less than half of them"
+    felt.forget_near(np.array([0.1, 0.0]))
+    assert felt.met_below(places, 0.02) is None
+
+
 def test_the_first_measurement_is_no_displacement() -> None:
     seat = ToolSeat()
     np.testing.assert_array_equal(seat.displacement_B_m, np.zeros(3))
