@@ -79,8 +79,8 @@ def test_what_a_fingertip_met_is_kept_until_jaws_close_near_it() -> None:
     for record in (felt, other):
         assert record.met_below(places, 0.02) == 0.04
         assert record.met_below(places, 0.05) is None, "it stays above"
-        assert record.met_below(places + [0.0, 0.003], 0.02) == 0.04
-        assert record.met_below(places + [0.016, 0.0], 0.02) is None, "it covers less than half of them"
+        assert record.met_below(places + np.array([0.0, 0.003]), 0.02) == 0.04
+        assert record.met_below(places + np.array([0.016, 0.0]), 0.02) is None, "it covers less than half of them"
     felt.forget_near(np.array([0.1, 0.0]))
     assert felt.met_below(places, 0.02) is None
 
