@@ -16,6 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 from glotouch_bt import __version__
 from glotouch_bt.commands import COMMANDS, bench
 from glotouch_bt.commands.shared import set_debug, with_bare_values
+from glotouch_bt.interrupts import repeat_lost_interrupts
 
 
 class GroupedHelp(TyperGroup):
@@ -76,6 +77,7 @@ def main() -> None:
     if "--debug" in sys.argv[1:]:
         set_debug()
         sys.argv = [a for a in sys.argv if a != "--debug"]
+    repeat_lost_interrupts()
     try:
         app()
     finally:  # the command is over: one more Ctrl-C must not end the interpreter's own clean-up

@@ -16,6 +16,7 @@ from queue import SimpleQueue
 from types import TracebackType
 from typing import Any, ParamSpec, TypeVar
 
+from glotouch_bt.interrupts import repeat_lost_interrupts
 from glotouch_bt.robot import BadInput, GlotouchError
 
 P = ParamSpec("P")
@@ -57,8 +58,8 @@ class WorkerPool(Executor):
     """An executor with a fixed number of fresh processes (spawned: MuJoCo and threads do not survive a fork).
 
     A worker that dies gives `WorkerLost` to its own task only and is replaced. Workers are process groups of their own,
-    so that Ctrl-C reaches this process alone: the first raises KeyboardInterrupt once, and the pool then interrupts the
-    workers and cancels what waits; the next Ctrl-C kills them. Use it as a context manager.
+    so that Ctrl-C reaches this process alone: it raises KeyboardInterrupt, and the pool then interrupts the workers and
+    cancels what waits; the next Ctrl-C kills them. Use it as a context manager.
 
     Args:
         workers: Number of processes.
@@ -98,6 +99,7 @@ class WorkerPool(Executor):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._interrupted = kind is not None and issubclass(kind, KeyboardInterrupt)
         self.shutdown(cancel_futures=kind is not None)
         if self._handler_before is not None and not self._interrupted:
             signal.signal(signal.SIGINT, self._handler_before)
@@ -106,7 +108,6 @@ class WorkerPool(Executor):
         if self._interrupted:
             self._hurried = True
             return
-        self._interrupted = True
         raise KeyboardInterrupt
 
     def _cancel_waiting(self) -> None:
@@ -230,6 +231,7 @@ class TaskProcess:
 def serve(pipe: Connection) -> None:
     """Run in a worker: do one task after another until the pipe is closed or the parent is gone."""
     os.setsid()
+    repeat_lost_interrupts()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

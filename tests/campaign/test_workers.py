@@ -8,12 +8,14 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from glotouch_bt.campaign import TrialLost, WorkerLost, WorkerPool
+from glotouch_bt.interrupts import repeat_lost_interrupts
 from glotouch_bt.robot import BadInput, ParamError
 
 
@@ -151,3 +153,22 @@ def test_five_times_ctrl_c_in_a_bench(tmp_path: Path) -> None:
     assert (bench.returncode, out) == (130, "")
     said = [line for line in err.splitlines() if not line.endswith(" bad")]
     assert said == ["glotouch: interrupted"]
+
+
+def test_ctrl_c_that_python_swallows_is_raised_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python ignores what is raised in the callback of a weak reference; the command still ends."""
+
+    class Thing:
+        pass
+
+    def interrupted_callback(_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    repeat_lost_interrupts()
+    thing = Thing()
+    reference = weakref.ref(thing, interrupted_callback)
+    del thing
+    with pytest.raises(KeyboardInterrupt):
+        threading.Event().wait(10)
+    assert reference() is None

@@ -1,0 +1,25 @@
+"""Ctrl-C that Python ignores."""
+
+from __future__ import annotations
+
+import _thread
+import sys
+import threading
+
+AGAIN_S = 0.01
+
+
+def repeat_lost_interrupts() -> None:
+    """Raise KeyboardInterrupt again in the main thread where Python ignores it.
+
+    Python ignores whatever is raised in a finalizer or in the callback of a weak reference. The handler of Ctrl-C may
+    run in one of them.
+    """
+    sys.unraisablehook = _on_unraisable
+
+
+def _on_unraisable(lost: sys.UnraisableHookArgs) -> None:
+    if lost.exc_type is KeyboardInterrupt:
+        threading.Timer(AGAIN_S, _thread.interrupt_main).start()
+    else:
+        sys.__unraisablehook__(lost)
