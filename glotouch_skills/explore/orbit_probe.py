@@ -112,10 +112,12 @@ class OrbitProbe(Skill):
             )
         candidates = {c.index: c for c in admitted.candidates}
         for index in admitted.changed:
+            displaced_m = float(np.linalg.norm(traced.displaced_K_m))
+            explorer.distrust_free_space(candidates[index].contour, displaced_m)
             self.event(
                 "candidate",
                 candidate=candidates[index],
-                displaced_m=float(np.linalg.norm(traced.displaced_K_m)),
+                displaced_m=displaced_m,
                 ended=traced.ended,
                 moves=traced.moves,
             )

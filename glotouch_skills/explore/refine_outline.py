@@ -92,4 +92,5 @@ class RefineOutline(Skill):
             )
         self.refined = replace(better, height_m=p.height_m, top_touched=False) if anew else better
         moved = float(np.linalg.norm(traced.displaced_K_m))
+        explorer.distrust_free_space(better.contour, moved)
         self.event("candidate", candidate=self.refined, moved_m=moved, ended=traced.ended, moves=traced.moves)

@@ -210,6 +210,11 @@ class SearchMap:
             return np.full(len(points), np.inf)
         return np.asarray(self._tree.query(points)[0], dtype=np.float64)
 
+    def reaches_beyond(self, before: SearchMap) -> bool:
+        """Return True if the path leads to positions that it had not visited in an earlier state of this map."""
+        new = self.path_K_m[len(before.path_K_m) :]
+        return bool((before.path_distance(new) >= PATH_STEP_M).any())
+
     @property
     def found(self) -> int:
         """Number of traced objects."""

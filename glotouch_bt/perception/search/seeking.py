@@ -52,8 +52,9 @@ class Sought:
 def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bool) -> SearchPlan[Sought]:
     """Follow the policy until a side contact with a new object, then retreat from it.
 
-    Travelled paths at sensing height become free space. A refused move drops its frontier. A contact with a traced
-    object drops its position, and the search continues.
+    Travelled paths at sensing height become free space. A refused move drops its frontier, and so does a sweep that
+    ends without a contact and without any new position. A contact with a traced object drops its position, and the
+    search continues.
 
     Args:
         belief: Map before the search.
@@ -69,7 +70,7 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
             outcome = yield Move("retreat", tip - RETREAT_M * contact.approach_K[:2])
             return Sought(belief.with_path(outcome.path_K_m), contact, True)
     while not belief.complete:
-        stretch = policy.next_stretch(belief, tip)
+        before, stretch = belief, policy.next_stretch(belief, tip)
         if stretch is not None and (cornered or not lowered) and not stretch.raised:
             stretch = None
         if stretch is None:
@@ -105,6 +106,9 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 return Sought(belief.with_path(outcome.path_K_m), side, True)
             belief = belief.with_dropped(place)
             break
+        else:
+            if not stretch.raised and not belief.reaches_beyond(before):  # go on elsewhere, not here for ever
+                belief, cornered = belief.with_dropped(stretch.waypoints_K_m[-1]), True
     return Sought(belief, None, lowered)
 
 

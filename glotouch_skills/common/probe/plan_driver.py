@@ -12,7 +12,7 @@ import numpy as np
 
 from glotouch_bt.motion import Motion
 from glotouch_bt.perception.search import Move, MoveOutcome, SearchPlan, T
-from glotouch_bt.perception.touch import Contact, GuardParams
+from glotouch_bt.perception.touch import Contact, Contour, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import Context, Failure
 from glotouch_bt.skill.probing import HeldTool, Prober
@@ -34,6 +34,11 @@ COLUMN_M_S = 0.04
 """Speed of a descent in such a place. The ball is wider than the shaft that passed: an overhang may reach in between.
 At 0.10 m/s the robot stopped itself on one (`bench retrieve --seed 43400 --trials 10 --per-seed 2`, 49c1c63). Source:
 ours; rigid things met at 0.05 m/s gave 31 N."""
+MISFIT_M = 0.002
+"""RMS of an outline's residuals beyond which the object has moved between the contacts. Source: ours; they stay below
+1.5 mm for objects at rest."""
+DISPLACED_M = 0.010
+"""Motion during a trace beyond which it may have gone on unseen. Source: ours; at most 15 mm are followed."""
 OFF_TOP_M = 0.006
 """Raise the ball by this much from what it landed on."""
 
@@ -111,6 +116,16 @@ class Explorer:
             SkillFailed: `tool_lost`, `hard_contact`.
         """
         return (yield from drive(plan, self._make))
+
+    def distrust_free_space(self, contour: Contour, displaced_m: float) -> None:
+        """Forget the free space that was felt around an object which has moved by an unknown distance.
+
+        Args:
+            contour: Its outline; contacts that no outline fits were made before and after a motion.
+            displaced_m: Length of the motion that was seen during the trace.
+        """
+        if contour.rms_m > MISFIT_M or displaced_m > DISPLACED_M:
+            self._arm.felt.forget_free_near(contour.centre_K_m)
 
     def _make(self, move: Move) -> Motion[MoveOutcome]:
         self._require_tool()

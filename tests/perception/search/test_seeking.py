@@ -110,6 +110,19 @@ def test_no_sweep_out_of_a_corner_is_tried_again() -> None:
     assert sought.lowered
 
 
+def test_a_policy_that_goes_to_and_fro_is_left() -> None:
+    """Sweeps over what was swept already tell nothing: the search goes on elsewhere, and ends."""
+
+    class ToAndFro:
+        def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
+            return Stretch(np.array([[0.1 if tip_K_m[0] < 0.05 else 0.0, 0.0]]))
+
+    start = np.array([0.0, 0.0])
+    sought, moves = run(seek(blank(), ToAndFro(), start, lowered=True), start, free)
+    assert sought.contact is None
+    assert len(moves) <= 3 * MAX_HOPS
+
+
 def test_what_is_refused_is_given_up() -> None:
     start = np.array([0.0, 0.0])
 

@@ -27,6 +27,9 @@ from glotouch_bt.perception.search.routes import Routes, segment_is_free
 from glotouch_bt.robot import Array
 
 Indices = npt.NDArray[np.int64]
+SLACK_M = 0.002
+"""How far the executed path may lie from the planned one: only what is found from there too counts as found. Source:
+the map samples the path every 2 mm, and the arm follows a sweep to within 1 mm."""
 SAMPLE_M = 0.008
 """Spacing of the points at which legs are checked against envelopes."""
 
@@ -78,7 +81,7 @@ class _Hidden:
     """Discs that may hide something, by their first coordinate.
 
     Attributes:
-        centre, reach, weight: Of each disc (h, 2), (h,), (h,); see `Discs`.
+        centre, reach, weight: Of each disc (h, 2), (h,), (h,); see `Discs`. The reach is smaller by `SLACK_M`.
     """
 
     centre: Array
@@ -88,10 +91,10 @@ class _Hidden:
     @classmethod
     def of(cls, every: Discs, weight: Array, low: Array, high: Array) -> _Hidden:
         """Return the discs with a weight (h,) that a path between two corners (2,) of a region may touch."""
-        centre, reach = every.centre, every.reach[:, None]
+        centre, reach = every.centre, every.reach[:, None] - SLACK_M
         chosen = np.flatnonzero((weight > 0.0) & ((centre > low - reach) & (centre < high + reach)).all(axis=1))
         chosen = chosen[np.argsort(centre[chosen, 0], kind="stable")]
-        return cls(centre[chosen], every.reach[chosen], weight[chosen])
+        return cls(centre[chosen], every.reach[chosen] - SLACK_M, weight[chosen])
 
 
 @compiled("f8[:, ::1]", "f8[::1]", "f8[:, ::1]", "i8[::1]", "f8[:, ::1]", "f8[:, ::1]", "b1")
