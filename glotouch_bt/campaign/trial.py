@@ -12,7 +12,7 @@ from glotouch_bt.campaign.identity import code_versions, described_request, diff
 from glotouch_bt.campaign.trial_folder import TrialFolder, claimed
 from glotouch_bt.campaign.workers import TrialLost
 from glotouch_bt.robot import BadInput
-from glotouch_bt.runs import RunFolder, RunRequest, RunResult, launch
+from glotouch_bt.runs import RunFolder, RunRequest, RunResult, holds_run, launch
 
 Row = dict[str, Any]
 OnRow = Callable[[Any, int, int], object]
@@ -32,7 +32,8 @@ class Trial:
     Attributes:
         folder: Folder of the trial.
         identity: All that the row depends on, as plain JSON data.
-        run: Does the work and returns the row.
+        run: Does the work and returns the row. A `BadInput` that it raises before it has made a run in the folder
+            means a wrong request and ends the campaign; later, it is an error like any other.
         failed: Returns the row that stands for an error of `run`, or for a trial that was lost too often (`TrialLost`).
     """
 
@@ -78,14 +79,16 @@ def _claimed_row(trial: Trial, claimed_before: bool) -> Row:
     row = folder.read(trial.identity)
     if row is not None:
         return row
-    if claimed_before:
-        RunFolder(trial.folder).clear()  # a killed process left parts of a run
+    if claimed_before or holds_run(trial.folder):
+        RunFolder(trial.folder).clear()  # a killed or interrupted trial left a run or parts of one
     try:
         row = trial.run()
-    except (BadInput, TrialLost):
+    except TrialLost:
         raise
     except Exception as e:
-        if _lost_on_disk(e) is not None:
+        # A wrong request makes no run. After a run, its record is the input, and the trial has failed.
+        wrong_request = isinstance(e, BadInput) and not holds_run(trial.folder)
+        if wrong_request or _lost_on_disk(e) is not None:
             raise
         row = trial.failed(e)
     return folder.write(trial.identity, row)

@@ -117,6 +117,22 @@ def test_an_error_is_a_row_that_counts_again(request_: RunRequest) -> None:
     assert rows(trial(request_)) == [{"failed": "'a bug'"}]
 
 
+def test_a_wrong_request_ends_the_campaign_and_a_record_that_cannot_be_scored_fails_its_trial(
+    request_: RunRequest,
+) -> None:
+    """The same error before and after the run."""
+
+    def score(n: int) -> dict[str, Any]:
+        raise BadInput("two contacts")
+
+    def run() -> dict[str, Any]:
+        return score(len(trials.launch_trial(request_).result))
+
+    with pytest.raises(BadInput, match="two contacts"):
+        rows(trial(request_, lambda: score(0)))
+    assert rows(trial(request_, run)) == [{"failed": "two contacts"}]
+
+
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"request": {}}', '{"request": 1, "row": {}}'])
 def test_a_broken_file_is_no_trial(text: str, request_: RunRequest) -> None:
     rows(trial(request_))

@@ -86,6 +86,9 @@ def run_trial(head: Row, request: RunRequest) -> Row:
     row |= {"exit_code": done.exit_code, "cause": ""}
     if done.exit_code != 0:
         return row | {"cause": cause(done.result)}
+    objects = len(done.result["candidates"])
+    if objects != 1:
+        return row | {"cause": f"the square was traced as {objects} objects"}
     record = read_run(done.folder)
     return row | score(record, traced_square(record, head["tool"], head["square"] == "fixed"))
 

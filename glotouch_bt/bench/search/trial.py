@@ -42,8 +42,8 @@ def mission_trial(head: Row, request: RunRequest) -> Row:
     Raises:
         BadInput: The request itself is wrong.
     """
-    done = launch_trial(request)
     sections = sections_of(request.mission, request.objects, request.world)
+    done = launch_trial(request)
     return EMPTY_ROW | head | {"ended": _ended(done.result)} | score_run(read_run(done.folder), sections)
 
 

@@ -74,10 +74,10 @@ class SpaceCampaign(Campaign):
 
 def run_trial(head: Row, request: RunRequest) -> Row:
     """Run one trial in this process and return its row, which begins with the columns `head`."""
+    sections = sections_of(request.mission, request.objects, request.world)
     done = launch_trial(request)
     row = head | {k: done.result.get(k) for k in COLUMNS if k in done.result}
     row |= {"exit_code": done.exit_code, "cause": "" if done.exit_code == 0 else cause(done.result)}
-    sections = sections_of(request.mission, request.objects, request.world)
     record = read_run(done.folder)
     objects = score(record, sections, head["act"])
     if any(t.get("toppled") or not within(t) for t in objects):

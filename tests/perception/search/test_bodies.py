@@ -58,6 +58,16 @@ def test_two_bodies_that_touch_are_told_apart_without_a_gap(
     }
 
 
+def test_a_square_that_fingers_traced_is_one_body() -> None:
+    """Contact points up to 16 mm off, as of fingers that met a corner of the square with a corner of theirs."""
+    off = np.random.default_rng(1).choice([0.0, 0.002, 0.016], 16)
+    sides = np.repeat(np.arange(4) * np.pi / 2, 4)
+    along = np.tile([-0.024, -0.008, 0.008, 0.024], 4)
+    x, y = (0.03 + off) * np.cos(sides) - along * np.sin(sides), (0.03 + off) * np.sin(sides) + along * np.cos(sides)
+    points = tuple(contact(*p) for p in zip(x, y, sides, strict=True))
+    assert bodies(points, 0.0, NO_PATH) == (points,)
+
+
 def test_too_few_contacts_are_one_body() -> None:
     assert bodies(LEFT[:3], R, NO_PATH) == (LEFT[:3],)
 
