@@ -199,19 +199,19 @@ class _Search:
     ) -> _Search:
         """Search the poses; `terms` are those of outline and height."""
         model, touchset = hypothesis.model, reading.touchset
-        bias_sd = _bias_sd_m(reading, p)
+        bias_sd = _bias_sd_m(reading, p) if reading.sequences else p.offset_sd_m
         grid = Grid.of(p, bias_sd)
         log_bias = _log_normal(grid.bias_m, bias_sd)
         if not reading.sequences:
             ratio = p.outline_offset + p.slope * sum(terms.values())
-            none = np.zeros((1, 1, 1, 1), dtype=np.float32)
-            return cls(hypothesis, reading, terms, grid, none, log_bias, None, (), none, 0.0, ratio)
+            none = np.zeros((1, 1, 1, 1))
+            return cls(
+                hypothesis, reading, terms, grid, none, log_bias, None, (), none.astype(np.float32), 0.0, ratio
+            )  # fmt: skip
         first = reading.sequences[0][0].layer.yaw_rad
         turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
         parallel = bool(np.abs((turns + np.pi / 2) % np.pi - np.pi / 2).max() < PARALLEL_RAD)
-        common = yaw_prior(model, touchset.candidate, first, p)[None, :, None, None] + _log_normal(
-            grid.z0_m, p.z0_sd_m
-        )
+        common = yaw_prior(model, touchset.candidate, first, p)[None, :, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
         if parallel:  # parallel tracks share one shift along x_P; each may slide
             common = common + shift_prior(model, touchset.candidate, 0.0, grid.shift_m, p)[None, :, :, None]
         moved = observed_turns(touchset)
@@ -254,9 +254,7 @@ class _Search:
 
     def shift_indices(self, at: tuple[int, int, int, int], p: LikelihoodParams) -> list[int]:
         """Return the index of each sequence's likeliest shift at (bias, yaw, common shift, height offset)."""
-        return [
-            _best_shift(self.volume(part, part.widths, p), self.slide, self.flips(part), at) for part in self.parts
-        ]
+        return [_best_shift(self.volume(part, part.widths, p), self.slide, self.flips(part), at) for part in self.parts]
 
     def shifts_m(self, indices: Sequence[int]) -> Array:
         """Return the shifts of all sequences of the TouchSet; 0 for those without evidence."""

@@ -24,6 +24,10 @@ Floats = npt.NDArray[np.floating]
 T_PEAK = 2 / (math.pi * math.sqrt(3))
 """Density of Student's t with three degrees of freedom at 0."""
 
+LAYERS_A_LOG = 4
+"""Number of layers whose density ratios are multiplied before their logarithm is taken. Each ratio is between
+`width_outlier` and about 1e4, so that the product of four cannot leave the range of 32 bit."""
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -84,10 +88,11 @@ def width_ratios(
     A width that the model does not know is as that of any object (`Certainty`).
     """
     shape = (len(model.phi_rad), len(grid.shift_m), len(grid.z0_m))
-    total = np.zeros((len(grid.bias_m), *shape[::-1]), dtype=np.float32).transpose(0, 3, 2, 1)  # yaws are contiguous
+    total = np.zeros((len(grid.bias_m), *shape[::-1]), dtype=np.float32)
     bias = grid.bias_m.astype(np.float32)[:, None, None, None]
     volumes: list[WidthVolumes] = []
-    for o in seen:
+    product: Floats = np.ones_like(total)
+    for n, o in enumerate(seen, 1):
         e = o.layer
         at, z_m = e.along_m + grid.shift_m, e.height_m + grid.z0_m
         off = np.float32(e.width_m) - interpolated_width(model, at, z_m, turn_rad)
@@ -101,20 +106,22 @@ def width_ratios(
             sd = np.hypot(sd, unsure)
             known = nearest(model.certainty.width_known, model, at, z_m, turn_rad)
         volumes.append(WidthVolumes(off, sd, known, unsure))
-        peak, missed = _peak(o, sd, p), _missed(known, p)
-        biased = off - bias
+        peak, missed = known * _peak(o, sd, p), _missed(known, p)
+        near = off.transpose(2, 1, 0) - bias  # all in (nb, nz, nd, 72), the order in memory, and in place
         if e.upper_only:
-            np.minimum(biased, np.float32(0), out=biased)
-        biased /= sd
-        near = biased  # known * width_kernel(biased) * peak + missed, in place
-        near *= biased
+            np.minimum(near, np.float32(0), out=near)
+        near /= sd.transpose(2, 1, 0)
+        near *= near
         near *= np.float32(1 / 3)
         near += np.float32(1)
         near *= near
-        density = np.divide(known * peak, near, out=near)
-        density += missed
-        total += np.log(density, out=density)
-    return total, volumes
+        np.divide(peak.transpose(2, 1, 0), near, out=near)
+        near += missed.transpose(2, 1, 0)
+        product *= near
+        if n % LAYERS_A_LOG == 0 or n == len(seen):
+            total += np.log(product)
+            product = np.ones_like(total)
+    return total.transpose(0, 3, 2, 1), volumes
 
 
 def twin_ratios(volumes: Sequence[WidthVolumes], seen: Sequence[Observed], p: LikelihoodParams) -> Array32:
@@ -211,8 +218,8 @@ class _View:
     total: Array32
 
 
-def _squared_distances(model: TargetModel, views: Sequence[_View]) -> Array32:
-    """Return mean squared distances (n, nz, nd, 72) of features to the table, interpolated between cells.
+def _squared_distances(model: TargetModel, views: Sequence[_View]) -> list[Array32]:
+    """Return mean squared distances (nz, nd, 72) of each feature to the table, interpolated between cells.
 
     All views lie between the same heights of the table.
     """
@@ -230,12 +237,13 @@ def _squared_distances(model: TargetModel, views: Sequence[_View]) -> Array32:
     np.maximum(squared, np.float32(0), out=squared)
     squared *= np.float32(1 / features.shape[1])
     squared = squared.reshape(d - c, len(views), b - a, -1).transpose(1, 0, 2, 3)
-    out = np.empty((*j.shape, i.shape[1], squared.shape[-1]), dtype=np.float32)
+    out = []
     for k, one in enumerate(squared):
         along = one[:, i[k] - a]
         along += f[k][None, :, None] * (one[:, i[k] - a + 1] - along)
         low = along[j[k] - c]
-        np.add(low, g[k][:, None, None] * (along[j[k] - c + 1] - low), out=out[k])
+        low += g[k][:, None, None] * (along[j[k] - c + 1] - low)
+        out.append(low)
     return out
 
 
@@ -269,10 +277,10 @@ def nearest(table: Array32, model: TargetModel, l_m: Array, z_m: Array, turn_rad
     return _turned(table.transpose(2, 1, 0)[j[:, None], i[None, :]], turn).transpose(2, 1, 0)
 
 
-def _turned(x: Array32, steps: int) -> Array32:
+def _turned(x: Floats, steps: int) -> Array32:
     """Return an array (..., 72) at yaws that are `steps` larger."""
     at = steps % x.shape[-1]
-    return np.concatenate([x[..., at:], x[..., :at]], axis=-1) if at else x
+    return np.asarray(np.concatenate([x[..., at:], x[..., :at]], axis=-1) if at else x, dtype=np.float32)
 
 
 def _positions(axis: Array, x: Array) -> tuple[Index, Array32]:
