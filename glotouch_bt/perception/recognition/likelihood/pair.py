@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,11 +25,13 @@ from glotouch_bt.perception.recognition.likelihood.scalars import (
 from glotouch_bt.perception.recognition.likelihood.volumes import (
     Grid,
     Observed,
+    WidthVolumes,
     image_ratios,
     log_sum,
     marginalise_slide,
     marginalise_turn,
     slide_matrix,
+    twin_ratios,
     width_ratios,
 )
 from glotouch_bt.perception.recognition.model import Array32, PadSpec, TargetHypothesis, TargetModel
@@ -125,14 +127,11 @@ def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -
     cheap = np.array(
         [math.log(h.weight) + p.slope * sum(t.values()) for h, t in zip(model.hypotheses, terms, strict=True)]
     )
-    pairs = [
-        (_compare(h, reading, t, p), math.log(h.weight))
-        for h, t, c in zip(model.hypotheses, terms, cheap, strict=True)
-        if c > cheap.max() - PRUNE_NATS
-    ]
-    best = max(pairs, key=lambda x: x[0].log_ratio + x[1])[0]
-    total = float(np.logaddexp.reduce([x.log_ratio + w for x, w in pairs]))
-    return replace(best, log_ratio=total)
+    kept = [(h, t) for h, t, c in zip(model.hypotheses, terms, cheap, strict=True) if c > cheap.max() - PRUNE_NATS]
+    searches = [_Search.of(h, reading, t, p) for h, t in kept]
+    log_ratios = [s.log_ratio + math.log(s.hypothesis.weight) for s in searches]
+    best = searches[int(np.argmax(log_ratios))]
+    return best.pair(float(np.logaddexp.reduce(log_ratios)), p)
 
 
 def _scalar_terms(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> dict[str, float]:
@@ -144,94 +143,175 @@ def _scalar_terms(model: TargetModel, candidate: Candidate, p: LikelihoodParams)
     return {name: p.temper_outline * value for name, value in terms.items()}
 
 
-def _compare(
-    hypothesis: TargetHypothesis, reading: TouchSetReading, terms: dict[str, float], p: LikelihoodParams
-) -> Pair:
-    """Compute the evidence for one hypothesis, marginalised over bias, yaw, height, and each sequence's shift and turn.
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One sequence in a search; log ratios are tempered.
 
-    Args:
+    Attributes:
+        seen: Its layers.
+        turn_rad: Yaw of its hand from that of the first sequence.
+        turn_sd_rad: Standard deviation of the object's turn since the first closure.
+        widths, images: (nb, 72, nd, nz) and (72, nd, nz) log ratios.
+        layers: The width of each layer.
+    """
+
+    seen: tuple[Observed, ...]
+    turn_rad: float
+    turn_sd_rad: float
+    widths: Array32
+    images: Array32
+    layers: list[WidthVolumes]
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The evidence for one hypothesis, marginalised over bias, yaw, height, and each sequence's shift and turn.
+
+    Attributes:
         hypothesis: How the target stands.
         reading: Background evidence of the touches.
-        terms: Those of outline and height.
-        p: Parameters.
+        terms: Terms of outline, height and relief.
+        grid: Grid of the nuisances.
+        common: Log prior of yaw, shift and height offset.
+        log_bias: (nb,) log prior of the bias.
+        slide: See `_best_shift`.
+        parts: The sequences.
+        joint: (nb, 72, nd or 1, nz) log ratio before the last marginalisation.
+        total: Log ratio of widths and images.
+        log_ratio: As in `Pair`, of this hypothesis alone.
     """
-    model, touchset = hypothesis.model, reading.touchset
-    candidate = touchset.candidate
-    if not reading.sequences:
-        ratio = p.outline_offset + p.slope * sum(terms.values())
-        pose = contour_pose(touchset)
-        return Pair(candidate.index, ratio, 0.0, terms, None, 0.0, 0.0, None, pose, 0.0, hypothesis)
-    bias_sd = _bias_sd_m(reading, p)
-    grid = Grid.of(p, bias_sd)
-    first = reading.sequences[0][0].layer.yaw_rad
-    turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
-    parallel = bool(np.abs((turns + np.pi / 2) % np.pi - np.pi / 2).max() < PARALLEL_RAD)
-    common = yaw_prior(model, candidate, first, p)[None, :, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
-    if parallel:  # parallel tracks share one shift along x_P; each may slide
-        common = common + shift_prior(model, candidate, 0.0, grid.shift_m, p)[None, :, :, None]
-    twin = common.astype(np.float32)
-    log_bias = _log_normal(grid.bias_m, bias_sd)
-    joint = (common + log_bias[:, None, None, None]).astype(np.float32)
-    slide = slide_matrix(grid, p)
-    moved = observed_turns(touchset)
-    parts = []
-    for seen, turn in zip(reading.sequences, turns, strict=True):
-        flip = bool(np.cos(turn) < 0)
-        sd = math.hypot(p.turn_sd_rad, moved[seen[0].layer.sequence])
-        widths, twins, offs = width_ratios(model, seen, turn, grid, p)
-        widths, twins = np.float32(p.temper_width) * widths, np.float32(p.temper_width) * twins
-        images = np.float32(p.temper_image) * image_ratios(model, seen, turn, grid, p)
-        volume = np.concatenate([widths, twins]) + images[None]  # the twin is appended on the bias axis
-        if parallel:
-            volume = volume[:, :, ::-1] if flip else volume
-            mean = marginalise_turn(marginalise_slide(volume, slide), p, sd)
-        else:
-            volume = volume + shift_prior(model, candidate, turn, grid.shift_m, p)[None, :, :, None].astype(np.float32)
-            mean = marginalise_turn(log_sum(volume, 2), p, sd)[:, :, None]
-        joint, twin = joint + mean[:-1], twin + mean[-1:]
-        parts.append((widths, images, volume, flip, offs))
-    total = float(log_sum(joint.reshape(1, -1), 1)[0])
-    by_places = float(log_sum(twin.reshape(1, -1), 1)[0]) - total
-    felt: list[Residual] = []
-    b, i, c, z = (int(k) for k in np.unravel_index(int(np.argmax(joint)), joint.shape))
-    shifts = np.zeros(len(touchset.sequences))
-    terms["width"] = terms["image"] = 0.0
-    for seen, (widths, images, volume, flip, offs) in zip(reading.sequences, parts, strict=True):
-        d = _best_shift(volume, slide if parallel else None, flip, (b, i, c, z))
-        shifts[seen[0].layer.sequence] = grid.shift_m[d]
-        terms["width"] += float(widths[b, i, d, z])
-        terms["image"] += float(images[i, d, z])
-        sharp = [(o, at) for o, at in zip(seen, offs, strict=True) if not o.layer.upper_only]
-        felt += [r for o, at in sharp if (r := residual(at, o, (i, d, z)))]
-    by_bands = p.temper_width * log_banded_twin(felt, grid.bias_m, log_bias, p)
-    log_twin = p.twin_slope * 0.5 * (by_places + by_bands)
-    terms["pose"] = total - terms["width"] - terms["image"]
-    log_pose = log_sum(joint, (0, 2))
-    if _has_relief(reading) and p.offset + p.slope * sum(terms.values()) > HOPELESS_NATS:
 
-        def shifts_at(at: tuple[int, int, int, int]) -> Array:
-            found = np.zeros(len(touchset.sequences))
-            for seen, (_, _, volume, flip, _) in zip(reading.sequences, parts, strict=True):
-                d = _best_shift(volume, slide if parallel else None, flip, at)
-                found[seen[0].layer.sequence] = grid.shift_m[d]
-            return found
+    hypothesis: TargetHypothesis
+    reading: TouchSetReading
+    terms: dict[str, float]
+    grid: Grid
+    common: Array
+    log_bias: Array
+    slide: Array32 | None
+    parts: tuple[_Part, ...]
+    joint: Array32
+    total: float
+    log_ratio: float
 
-        poses = _likely_poses(model, joint, log_pose, grid, shifts_at, p.relief_poses)
-        layers = [
-            (o.layer, float(turn), o.log_reliefs)
-            for seen, turn in zip(reading.sequences, turns, strict=True)
-            for o in seen
-        ]
-        terms["relief"] = relief_ratio(model, layers, poses, p)
-    yaw = _refined(log_sum(log_pose, 1), i)
-    fit, pose = fitted_pose(
-        model, touchset, reading.evidence, yaw, shifts, float(grid.z0_m[z]), 1.0, float(grid.bias_m[b])
-    )
-    ratio = p.offset + p.slope * sum(terms.values())
-    return Pair(
-        candidate.index, ratio, log_twin, terms, np.asarray(log_pose - total, dtype=np.float32), first,
-        float(grid.bias_m[b]), fit, pose, reading.evidence.weight, hypothesis,
-    )  # fmt: skip
+    @classmethod
+    def of(
+        cls, hypothesis: TargetHypothesis, reading: TouchSetReading, terms: dict[str, float], p: LikelihoodParams
+    ) -> _Search:
+        """Search the poses; `terms` are those of outline and height."""
+        model, touchset = hypothesis.model, reading.touchset
+        bias_sd = _bias_sd_m(reading, p) if reading.sequences else p.offset_sd_m
+        grid = Grid.of(p, bias_sd)
+        log_bias = _log_normal(grid.bias_m, bias_sd)
+        if not reading.sequences:
+            ratio = p.outline_offset + p.slope * sum(terms.values())
+            none = np.zeros((1, 1, 1, 1))
+            return cls(
+                hypothesis, reading, terms, grid, none, log_bias, None, (), none.astype(np.float32), 0.0, ratio
+            )  # fmt: skip
+        first = reading.sequences[0][0].layer.yaw_rad
+        turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
+        parallel = bool(np.abs((turns + np.pi / 2) % np.pi - np.pi / 2).max() < PARALLEL_RAD)
+        common = yaw_prior(model, touchset.candidate, first, p)[None, :, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
+        if parallel:  # parallel tracks share one shift along x_P; each may slide
+            common = common + shift_prior(model, touchset.candidate, 0.0, grid.shift_m, p)[None, :, :, None]
+        moved = observed_turns(touchset)
+        parts = []
+        images = image_ratios(model, reading.sequences, turns.tolist(), grid, p)
+        for seen, turn, image in zip(reading.sequences, turns.tolist(), images, strict=True):
+            sd = math.hypot(p.turn_sd_rad, moved[seen[0].layer.sequence])
+            widths, layers = width_ratios(model, seen, turn, grid, p)
+            tempered = np.float32(p.temper_width) * widths, np.float32(p.temper_image) * image
+            parts.append(_Part(seen, turn, sd, *tempered, layers))
+        found = cls(
+            hypothesis, reading, terms, grid, common, log_bias, slide_matrix(grid, p) if parallel else None,
+            tuple(parts), (common + log_bias[:, None, None, None]).astype(np.float32), 0.0, 0.0,
+        )  # fmt: skip
+        joint = found.joint
+        for part in parts:
+            joint = joint + found.marginal(part, part.widths, p)
+        total = float(log_sum(joint.reshape(1, -1), 1)[0])
+        return replace(found, joint=joint, total=total)._with_relief(p)
+
+    def volume(self, part: _Part, widths: Array32, p: LikelihoodParams) -> Array32:
+        """Return the log ratio (nb, 72, nd, nz) of a sequence with given log ratios of widths."""
+        volume = widths + part.images[None]
+        if self.slide is not None:
+            return volume[:, :, ::-1] if self.flips(part) else volume
+        candidate = self.reading.touchset.candidate
+        prior = shift_prior(self.hypothesis.model, candidate, part.turn_rad, self.grid.shift_m, p)
+        return np.asarray(volume + prior[None, :, :, None].astype(np.float32))
+
+    def marginal(self, part: _Part, widths: Array32, p: LikelihoodParams) -> Array32:
+        """Return `volume`, marginalised over the sequence's own shift and turn."""
+        volume = self.volume(part, widths, p)
+        if self.slide is not None:
+            return marginalise_turn(marginalise_slide(volume, self.slide), p, part.turn_sd_rad)
+        return marginalise_turn(log_sum(volume, 2), p, part.turn_sd_rad)[:, :, None]
+
+    def flips(self, part: _Part) -> bool:
+        """Return True if the hand of a parallel track points the other way."""
+        return bool(np.cos(part.turn_rad) < 0)
+
+    def shift_indices(self, at: tuple[int, int, int, int], p: LikelihoodParams) -> list[int]:
+        """Return the index of each sequence's likeliest shift at (bias, yaw, common shift, height offset)."""
+        return [_best_shift(self.volume(part, part.widths, p), self.slide, self.flips(part), at) for part in self.parts]
+
+    def shifts_m(self, indices: Sequence[int]) -> Array:
+        """Return the shifts of all sequences of the TouchSet; 0 for those without evidence."""
+        shifts = np.zeros(len(self.reading.touchset.sequences))
+        for part, d in zip(self.parts, indices, strict=True):
+            shifts[part.seen[0].layer.sequence] = self.grid.shift_m[d]
+        return shifts
+
+    def _with_relief(self, p: LikelihoodParams) -> _Search:
+        ratio = p.offset + p.slope * (sum(self.terms.values()) + self.total)
+        if not _has_relief(self.reading) or ratio <= HOPELESS_NATS:
+            return replace(self, log_ratio=ratio)
+        model = self.hypothesis.model
+        poses = _likely_poses(
+            model, self.joint, log_sum(self.joint, (0, 2)), self.grid,
+            lambda at: self.shifts_m(self.shift_indices(at, p)), p.relief_poses,
+        )  # fmt: skip
+        layers = [(o.layer, part.turn_rad, o.log_reliefs) for part in self.parts for o in part.seen]
+        relief = relief_ratio(model, layers, poses, p)
+        return replace(self, terms=self.terms | {"relief": relief}, log_ratio=ratio + p.slope * relief)
+
+    def pair(self, log_ratio: float, p: LikelihoodParams) -> Pair:
+        """Return the evidence of all hypotheses, `log_ratio`, with the pose of this one, the likeliest."""
+        touchset, grid = self.reading.touchset, self.grid
+        index, weight = touchset.candidate.index, self.reading.evidence.weight
+        if not self.parts:
+            pose = contour_pose(touchset)
+            return Pair(index, log_ratio, 0.0, self.terms, None, 0.0, 0.0, None, pose, 0.0, self.hypothesis)
+        b, i, c, z = (int(k) for k in np.unravel_index(int(np.argmax(self.joint)), self.joint.shape))
+        at = self.shift_indices((b, i, c, z), p)
+        width = sum(float(part.widths[b, i, d, z]) for part, d in zip(self.parts, at, strict=True))
+        image = sum(float(part.images[i, d, z]) for part, d in zip(self.parts, at, strict=True))
+        terms = {k: v for k, v in self.terms.items() if k != "relief"}
+        terms |= {"width": width, "image": image, "pose": self.total - width - image} | self.terms
+        log_pose = log_sum(self.joint, (0, 2))
+        fit, pose = fitted_pose(
+            self.hypothesis.model, touchset, self.reading.evidence, _refined(log_sum(log_pose, 1), i),
+            self.shifts_m(at), float(grid.z0_m[z]), 1.0, float(grid.bias_m[b]),
+        )  # fmt: skip
+        first = self.reading.sequences[0][0].layer.yaw_rad
+        return Pair(
+            index, log_ratio, self._log_twin((i, z), at, p), terms, np.asarray(log_pose - self.total, dtype=np.float32),
+            first, float(grid.bias_m[b]), fit, pose, weight, self.hypothesis,
+        )  # fmt: skip
+
+    def _log_twin(self, at: tuple[int, int], shifts: Sequence[int], p: LikelihoodParams) -> float:
+        """Return `Pair.log_twin`; `at` and `shifts` are the indices of the best yaw, height offset and shifts."""
+        twin = self.common.astype(np.float32)
+        felt: list[Residual] = []
+        for part, d in zip(self.parts, shifts, strict=True):
+            widths = np.float32(p.temper_width) * twin_ratios(part.layers, part.seen, p)
+            twin = twin + self.marginal(part, widths, p)
+            sharp = [(o, layer) for o, layer in zip(part.seen, part.layers, strict=True) if not o.layer.upper_only]
+            felt += [r for o, layer in sharp if (r := residual(layer, o, (at[0], d, at[1])))]
+        by_places = float(log_sum(twin.reshape(1, -1), 1)[0]) - self.total
+        by_bands = p.temper_width * log_banded_twin(felt, self.grid.bias_m, self.log_bias, p)
+        return p.twin_slope * 0.5 * (by_places + by_bands)
 
 
 def _best_shift(volume: Array32, slide: Array32 | None, flip: bool, at: tuple[int, int, int, int]) -> int:

@@ -151,19 +151,25 @@ class TargetModel:
 
     @cached_property
     def width_m(self) -> Array32:
-        """(72, nl, nz) support width W(l, z; phi), eq. (finite_window_width); NaN if a window is empty."""
-        return self.reach_m + mirrored(self.reach_m)
+        """(72, nl, nz) support width W(l, z; phi), eq. (finite_window_width); NaN if a window is empty.
+
+        Yaws are contiguous in memory.
+        """
+        return _by_place(self.reach_m + mirrored(self.reach_m))
 
     @cached_property
     def unevenness_m(self) -> Array32:
-        """(72, nl, nz) RMS difference of `width_m` to the six neighbouring cells, at most MAX_UNEVENNESS_M each."""
+        """(72, nl, nz) RMS difference of `width_m` to the six neighbouring cells, at most MAX_UNEVENNESS_M each.
+
+        Yaws are contiguous in memory.
+        """
         w, most = self.width_m, np.float32(MAX_UNEVENNESS_M**2)
         total = np.zeros_like(w)
         for axis, wraps in ((0, True), (1, False), (2, False)):
             step = np.diff(w, axis=axis, append=w[:1] if wraps else np.take(w, [-1], axis=axis)) ** 2
             step = np.fmin(step, most)  # fmin: the maximum beside an empty window
             total += step + np.roll(step, 1, axis=axis)
-        return np.asarray(np.sqrt(total / 6))
+        return _by_place(np.sqrt(total / 6))
 
     @property
     def narrowest_m(self) -> float:
@@ -211,6 +217,11 @@ class TargetModel:
             t = self.width_m[j, a : a + 2, b : b + 2]
             total += w * float(np.array([1 - wl, wl]) @ t.astype(np.float64) @ np.array([1 - wz, wz]))
         return total
+
+
+def _by_place(table: Array32) -> Array32:
+    """Return a table (72, nl, nz) in the memory order (nz, nl, 72)."""
+    return np.ascontiguousarray(table.transpose(2, 1, 0)).transpose(2, 1, 0)
 
 
 def _bracket(grid: Array, x: float) -> tuple[int, float]:
