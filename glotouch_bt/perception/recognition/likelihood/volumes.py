@@ -26,7 +26,7 @@ T_PEAK = 2 / (math.pi * math.sqrt(3))
 
 LAYERS_A_LOG = 4
 """Number of layers whose density ratios are multiplied before their logarithm is taken. Each ratio is between
-`width_outlier` and about 1e4, so that the product of four cannot leave the range of 32 bit."""
+`width_outlier` and about 1e4, so the product of four stays in the range of 32 bit for a `width_outlier` above 1e-9."""
 
 
 @dataclass(frozen=True)
