@@ -144,7 +144,7 @@ def _scalar_terms(model: TargetModel, candidate: Candidate, p: LikelihoodParams)
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _SearchedSequence:
     """One sequence in a search; log ratios are tempered.
 
     Attributes:
@@ -188,7 +188,7 @@ class _Search:
     common: Array
     log_bias: Array
     slide: Array32 | None
-    parts: tuple[_Part, ...]
+    parts: tuple[_SearchedSequence, ...]
     joint: Array32
     total: float
     log_ratio: float
@@ -221,7 +221,7 @@ class _Search:
             sd = math.hypot(p.turn_sd_rad, moved[seen[0].layer.sequence])
             widths, layers = width_ratios(model, seen, turn, grid, p)
             tempered = np.float32(p.temper_width) * widths, np.float32(p.temper_image) * image
-            parts.append(_Part(seen, turn, sd, *tempered, layers))
+            parts.append(_SearchedSequence(seen, turn, sd, *tempered, layers))
         found = cls(
             hypothesis, reading, terms, grid, common, log_bias, slide_matrix(grid, p) if parallel else None,
             tuple(parts), (common + log_bias[:, None, None, None]).astype(np.float32), 0.0, 0.0,
@@ -232,7 +232,7 @@ class _Search:
         total = float(log_sum(joint.reshape(1, -1), 1)[0])
         return replace(found, joint=joint, total=total)._with_relief(p)
 
-    def volume(self, part: _Part, widths: Array32, p: LikelihoodParams) -> Array32:
+    def volume(self, part: _SearchedSequence, widths: Array32, p: LikelihoodParams) -> Array32:
         """Return the log ratio (nb, 72, nd, nz) of a sequence with given log ratios of widths."""
         volume = widths + part.images[None]
         if self.slide is not None:
@@ -241,14 +241,14 @@ class _Search:
         prior = shift_prior(self.hypothesis.model, candidate, part.turn_rad, self.grid.shift_m, p)
         return np.asarray(volume + prior[None, :, :, None].astype(np.float32))
 
-    def marginal(self, part: _Part, widths: Array32, p: LikelihoodParams) -> Array32:
+    def marginal(self, part: _SearchedSequence, widths: Array32, p: LikelihoodParams) -> Array32:
         """Return `volume`, marginalised over the sequence's own shift and turn."""
         volume = self.volume(part, widths, p)
         if self.slide is not None:
             return marginalise_turn(marginalise_slide(volume, self.slide), p, part.turn_sd_rad)
         return marginalise_turn(log_sum(volume, 2), p, part.turn_sd_rad)[:, :, None]
 
-    def flips(self, part: _Part) -> bool:
+    def flips(self, part: _SearchedSequence) -> bool:
         """Return True if the hand of a parallel track points the other way."""
         return bool(np.cos(part.turn_rad) < 0)
 
