@@ -62,7 +62,7 @@ def _claim(name: str, meta: dict[str, Any], summary: Any) -> str:
     """Return the section of a claim.
 
     Raises:
-        ValueError: A row has no value in any column.
+        ValueError: A row has no value in any column, or a note is no text (quote one with a colon in it).
     """
     older = " (older code)" if meta.get("older") else ""
     columns = meta.get("columns") or {"measured": ""}
@@ -86,6 +86,8 @@ def _claim(name: str, meta: dict[str, Any], summary: Any) -> str:
     parts.append(table(("", *columns, *(["wanted"] if wanted else [])), rows))
     parts.append("; ".join(made) + ".\n")
     if meta.get("notes"):
+        if strange := [note for note in meta["notes"] if not isinstance(note, str)]:
+            raise ValueError(f"docs/results/{name}: a note is no text: {strange[0]!r}")
         parts.append("\n".join(f"- {note}" for note in meta["notes"]) + "\n")
     if meta.get("image"):
         parts.append(f"![{meta['title']}]({meta['image']})\n")
