@@ -27,7 +27,7 @@ def time_matching(layouts: Sequence[Layout], objects: Path, names: Sequence[str]
 
     `new_stl_s`: build and save the model of an uncached mesh. `load_stl_ms`: map a saved model. Both include the tables
     built at first use: the first ranking's extra time over a second one. `pair_ms`: one ranking of a box divided by its
-    TouchSets, with everything warm; of the side on which the mesh stands in its file. Missions compare all stable sides.
+    TouchSets, with everything warm, of the mesh as it stands in its file. Missions compare all its sides.
     """
     touched = [x for x in layouts if x.touched][:REPEATS]
     if not touched:
