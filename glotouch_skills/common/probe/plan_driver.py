@@ -35,10 +35,11 @@ COLUMN_M_S = 0.04
 At 0.10 m/s the robot stopped itself on one (`bench retrieve --seed 43400 --trials 10 --per-seed 2`, 49c1c63). Source:
 ours; rigid things met at 0.05 m/s gave 31 N."""
 MISFIT_M = 0.002
-"""RMS of an outline's residuals beyond which the object has moved between the contacts. Source: ours; they stay below
-1.5 mm for objects at rest."""
+"""RMS of an outline's residuals beyond which the object has moved between the contacts. Source: ours, not
+calibrated."""
 DISPLACED_M = 0.010
-"""Motion during a trace beyond which it may have gone on unseen. Source: ours; at most 15 mm are followed."""
+"""Motion of an object during a trace beyond which it may have moved further unseen. Source: ours, not calibrated; a trace
+follows at most 15 mm."""
 OFF_TOP_M = 0.006
 """Raise the ball by this much from what it landed on."""
 

@@ -28,8 +28,8 @@ from glotouch_bt.robot import Array
 
 Indices = npt.NDArray[np.int64]
 SLACK_M = 0.002
-"""How far the executed path may lie from the planned one: only what is found from there too counts as found. Source:
-the map samples the path every 2 mm, and the arm follows a sweep to within 1 mm."""
+"""Tolerance for the distance between planned and executed path. A leg counts only the discs that a path this far beside
+it would also reach. Source: ours; the map samples the executed path at this spacing."""
 SAMPLE_M = 0.008
 """Spacing of the points at which legs are checked against envelopes."""
 
