@@ -38,8 +38,8 @@ MISFIT_M = 0.002
 """RMS of an outline's residuals beyond which the object has moved between the contacts. Source: ours, not
 calibrated."""
 DISPLACED_M = 0.010
-"""Motion of an object during a trace beyond which it may have moved further unseen. Source: ours, not calibrated; a trace
-follows at most 15 mm."""
+"""Motion of an object during a trace beyond which it may have moved further unseen. Source: ours, not calibrated; a
+trace follows at most 15 mm."""
 OFF_TOP_M = 0.006
 """Raise the ball by this much from what it landed on."""
 
