@@ -137,8 +137,25 @@ def test_pause_and_stop_from_another_thread(go: Any, robot: Any, log: list[str])
     assert robot.held >= 1
 
 
+@pytest.fixture
+def hangup() -> Iterator[Callable[[signal.Handlers], object]]:
+    """Set what SIGHUP does at first: a program inherits it, under `nohup` as ignored."""
+    before = signal.getsignal(signal.SIGHUP)
+    yield lambda action: signal.signal(signal.SIGHUP, action)
+    signal.signal(signal.SIGHUP, before)
+
+
+def test_a_run_under_nohup_outlives_its_terminal(hangup: Callable[[signal.Handlers], object]) -> None:
+    hangup(signal.SIG_IGN)
+    with operated(Control()):
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+
+
 @pytest.mark.parametrize("number", [signal.SIGUSR1, signal.SIGTERM, signal.SIGHUP])
-def test_signals_reach_the_mission(go: Any, robot: Any, number: signal.Signals) -> None:
+def test_signals_reach_the_mission(
+    go: Any, robot: Any, number: signal.Signals, hangup: Callable[[signal.Handlers], object]
+) -> None:
+    hangup(signal.SIG_DFL)
     before, record, cycle = signal.getsignal(number), Events(), robot.cycle
 
     def signalled(command: object) -> Any:
