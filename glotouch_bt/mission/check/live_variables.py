@@ -22,7 +22,8 @@ def followed(coarse: DataFlow) -> set[int]:
     """Return the variables that an exact analysis must follow, given one that takes each variable on its own.
 
     Besides those that decide, it follows the variables of which a finding may need the exact values: keys that are
-    unwritten on some paths only, keys that are compared, what a loop over items reads and writes, and resources.
+    unwritten on some paths only, keys that are compared, what a loop over items reads and writes, and resources. It
+    follows any variable that may not meet a requirement, too.
     """
     variables, found = coarse.variables, set(deciding(coarse))
     found.update(range(len(variables.keys), len(variables.sizes)))
@@ -32,7 +33,8 @@ def followed(coarse: DataFlow) -> set[int]:
     for requirement in coarse.looked:
         values = coarse.found(requirement)
         partly = UNSET in values and requirement.unset != "allowed"
-        if len(values) > 1 and (partly or kind_of(requirement.node).comparison(requirement.node) is not None):
+        compared = kind_of(requirement.node).comparison(requirement.node) is not None
+        if compared or values - requirement.good or (partly and len(values) > 1):
             found.add(requirement.variable)
     return found
 
