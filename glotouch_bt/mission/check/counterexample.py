@@ -61,7 +61,7 @@ def shortest_path(flow: DataFlow, goal: Goal, budget: StepBudget | None = None) 
 class _ShortestPath:
     def __init__(self, flow: DataFlow, goal: Goal) -> None:
         self._flow, self._goal = flow, goal
-        self.variables, self._sets = flow.variables, flow.variables.sets
+        self.variables = flow.variables
         self._nodes = list(flow.tree.walk())
         self._number = {id(n): i for i, n in enumerate(self._nodes)}
         followed = dict.fromkeys([goal.variable, *deciding(flow)])
@@ -155,7 +155,7 @@ class _ShortestPath:
         value = self.followed(values, requirement.variable)
         if value is not None:
             return {value}
-        return set(self._sets.values(self._flow.looked.get(requirement, EMPTY), requirement.variable))
+        return set(self._flow.sets.values(self._flow.looked.get(requirement, EMPTY), requirement.variable))
 
     def followed(self, values: Values, variable: int) -> int | None:
         """Return the value of a variable; None if the search does not follow it."""

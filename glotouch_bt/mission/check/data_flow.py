@@ -16,11 +16,12 @@ from glotouch_bt.mission.check.requirements import Requirements, verdicts
 from glotouch_bt.mission.nodes import (
     ANYTHING,
     EMPTY,
-    START,
     ConditionSettings,
     ExitStates,
     Requirement,
+    StateSets,
     StateVariables,
+    ValueSets,
     kind_of,
 )
 from glotouch_bt.mission.spec import NodeSpec
@@ -33,6 +34,8 @@ class DataFlow:
         tree: Its root.
         variables: Of the tree.
         requirements: Of its nodes.
+        sets: The algebra of sets of states; None: the exact one.
+        coarse: An analysis with sets that contain these. It answers for the variables that `sets` does not follow.
         lenient: If no state meets a requirement, go on as if all met it, to analyse what comes after a mistake.
             Otherwise nothing goes on, as in a run.
 
@@ -44,16 +47,24 @@ class DataFlow:
     """
 
     def __init__(
-        self, tree: NodeSpec, variables: StateVariables, requirements: Requirements, *, lenient: bool = False
+        self,
+        tree: NodeSpec,
+        variables: StateVariables,
+        requirements: Requirements,
+        sets: StateSets | ValueSets | None = None,
+        *,
+        coarse: DataFlow | None = None,
+        lenient: bool = False,
     ) -> None:
         self.tree, self.variables, self.requirements, self.lenient = tree, variables, requirements, lenient
-        self.sets = variables.sets
+        self.sets = StateSets(variables.sizes) if sets is None else sets
+        self._coarse = coarse
         self.has_unknown = any(kind_of(n).is_unknown(n) for n in tree.walk())
         self.entered: set[int] = set()
         self.ends: set[tuple[int, bool]] = set()
         self.looked: dict[Requirement, int] = {}
         self._known: dict[tuple[int, int], ExitStates] = {}
-        self.end = self.run(tree, START)
+        self.end = self.run(tree, self.sets.start)
 
     def run(self, node: NodeSpec, entry: int) -> ExitStates:
         """Return the exit states of a node that is entered in `entry`."""
@@ -89,6 +100,12 @@ class DataFlow:
         """Return the set in which a requirement was looked at, without the states that follow an unknown node."""
         looked = self.looked.get(requirement, EMPTY)
         return self.sets.where(looked, self.variables.lost, (0,)) if self.has_unknown else looked
+
+    def found(self, requirement: Requirement) -> frozenset[int]:
+        """Return the values that a requirement's variable may have where it is looked at."""
+        if self._coarse is not None and not self.sets.follows(requirement.variable):
+            return self._coarse.found(requirement)
+        return self.sets.values(self.judged(requirement), requirement.variable)
 
     def look(self, node: NodeSpec, port: str, entry: int) -> Requirement | None:
         """Note that the node reads a port (or resource) in these states; returns the requirement."""

@@ -109,9 +109,7 @@ class _Lint:
             return
         settings, variables = compared[1], self._flow.variables
         for requirement in self._flow.requirements[id(node)]:
-            found = variables.sets.values(self._flow.judged(requirement), requirement.variable) & (
-                requirement.good | {UNSET}
-            )
+            found = self._flow.found(requirement) & (requirement.good | {UNSET})
             yes, no = verdicts(variables, requirement, settings)
             if found - {UNSET} and not (found & yes and found & no):
                 said = "always holds" if found & yes else "never holds"

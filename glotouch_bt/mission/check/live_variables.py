@@ -13,9 +13,30 @@ from glotouch_bt.mission.spec import NodeSpec
 def deciding(flow: DataFlow) -> Iterator[int]:
     """Yield the variables whose value decides whether a run goes on, or how a comparison ends."""
     for requirement, looked in flow.looked.items():
-        found = flow.variables.sets.values(looked, requirement.variable)
+        found = flow.sets.values(looked, requirement.variable)
         if len(found) > 1 and _decides(flow, requirement, found):
             yield requirement.variable
+
+
+def followed(coarse: DataFlow) -> set[int]:
+    """Return the variables that an exact analysis must follow, given one that takes each variable on its own.
+
+    Besides those that decide, it follows the variables of which a finding may need the exact values: keys that are
+    unwritten on some paths only, keys that are compared, what a loop over items reads and writes, and resources. It
+    follows any variable that may not meet a requirement, too.
+    """
+    variables, found = coarse.variables, set(deciding(coarse))
+    found.update(range(len(variables.keys), len(variables.sizes)))
+    for node in coarse.tree.walk():
+        if kind_of(node).branches_on_unset:
+            found.update(variables.keys[wire.key] for wire in (*node.reads.values(), *node.writes.values()))
+    for requirement in coarse.looked:
+        values = coarse.found(requirement)
+        partly = UNSET in values and requirement.unset != "allowed"
+        compared = kind_of(requirement.node).comparison(requirement.node) is not None
+        if compared or values - requirement.good or (partly and len(values) > 1):
+            found.add(requirement.variable)
+    return found
 
 
 def _decides(flow: DataFlow, requirement: Requirement, found: frozenset[int]) -> bool:

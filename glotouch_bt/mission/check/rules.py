@@ -12,9 +12,20 @@ from typing import Any, get_type_hints
 from glotouch_bt.mission.check.counterexample import Goal, StepBudget, shortest_path
 from glotouch_bt.mission.check.data_flow import DataFlow
 from glotouch_bt.mission.check.lint import check_lint
-from glotouch_bt.mission.check.requirements import all_requirements
+from glotouch_bt.mission.check.live_variables import followed
+from glotouch_bt.mission.check.requirements import Requirements, all_requirements
 from glotouch_bt.mission.check.variables_of import variables_of
-from glotouch_bt.mission.nodes import ANYTHING, EMPTY, UNSET, Requirement, StateVariables, ValueKind, kind_of
+from glotouch_bt.mission.nodes import (
+    ANYTHING,
+    EMPTY,
+    UNSET,
+    Requirement,
+    StateSets,
+    StateVariables,
+    ValueKind,
+    ValueSets,
+    kind_of,
+)
 from glotouch_bt.mission.spec import Findings, NodeSpec, Place, base_of
 from glotouch_bt.robot import BadInput
 from glotouch_bt.skill import Skill
@@ -44,11 +55,28 @@ def check_flow(
     with _deep_recursion():
         variables = variables_of(tree)
         requirements = all_requirements(tree, variables)
+        if not findings.sorted():  # most missions have no fault: that is known long before all keys have been followed
+            flow, none = projected(tree, variables, requirements), Findings()
+            _Rules(flow, flow, skills, none, StepBudget(0)).all(leaves)
+            check_lint(flow, none, timeout_s)
+            if not none.sorted():
+                return
         exact = DataFlow(tree, variables, requirements)
         blocked = any(id(n) not in exact.entered for n in tree.walk())
-        lenient = DataFlow(tree, variables, requirements, lenient=True) if blocked else exact
-        _Rules(exact, lenient, skills, findings).all(leaves)
+        lenient = DataFlow(tree, variables, requirements, exact.sets, lenient=True) if blocked else exact
+        _Rules(exact, lenient, skills, findings, StepBudget()).all(leaves)
         check_lint(lenient, findings, timeout_s)
+
+
+def projected(tree: NodeSpec, variables: StateVariables, requirements: Requirements) -> DataFlow:
+    """Return an analysis that follows only the variables on which the course of a run may depend.
+
+    No other variable ever stops a node or decides a comparison, whatever its value, so its projection is exact: the
+    same nodes are entered, and end in the same ways, as with all variables.
+    """
+    coarse = DataFlow(tree, variables, requirements, ValueSets(variables.sizes))
+    sets = StateSets(variables.sizes, None if any(kind_of(n).concurrent for n in tree.walk()) else followed(coarse))
+    return DataFlow(tree, variables, requirements, sets, coarse=coarse)
 
 
 @contextmanager
@@ -66,12 +94,17 @@ class _Rules:
     """Nodes that some run enters are judged by the exact sets, nodes after a mistake by the lenient ones."""
 
     def __init__(
-        self, exact: DataFlow, lenient: DataFlow, skills: Mapping[str, type[Skill]], findings: Findings
+        self,
+        exact: DataFlow,
+        lenient: DataFlow,
+        skills: Mapping[str, type[Skill]],
+        findings: Findings,
+        budget: StepBudget,
     ) -> None:
         self._exact, self._lenient, self._skills, self._findings = exact, lenient, skills, findings
-        self._variables, self._sets = exact.variables, exact.variables.sets
+        self._variables, self._sets = exact.variables, exact.sets
         self._writers = _writers(exact.tree, exact.variables)
-        self._paths, self._budget = 0, StepBudget()
+        self._paths, self._budget = 0, budget
         self._unwritten: dict[str, list[Requirement]] = {}  # optional inputs, by the name of their key
 
     def all(self, leaves: Mapping[str, tuple[frozenset[str], Place]]) -> None:
@@ -90,9 +123,9 @@ class _Rules:
         looked = flow.judged(requirement)
         if looked == EMPTY:
             return
-        found = self._sets.values(looked, requirement.variable)
+        found = flow.found(requirement)
         if requirement.unset == "not always":  # a key that only an earlier mistake leaves unwritten is no mistake here
-            found |= self._sets.values(self._lenient.judged(requirement), requirement.variable) - {ANYTHING}
+            found |= self._lenient.found(requirement) - {ANYTHING}
         wrong = found - requirement.good - {UNSET}
         if requirement.of_resource:
             if bad := found - requirement.good:

@@ -19,12 +19,14 @@ from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from py_trees.common import Status
 
+from glotouch_bt.mission.check import rules as judge
 from glotouch_bt.mission.check.counterexample import Goal, shortest_path
 from glotouch_bt.mission.check.data_flow import DataFlow
 from glotouch_bt.mission.check.requirements import all_requirements
+from glotouch_bt.mission.check.rules import projected
 from glotouch_bt.mission.check.variables_of import variables_of
 from glotouch_bt.mission.nodes import ConditionSettings, condition, repeat
-from glotouch_bt.mission.nodes.base import EMPTY, START, StateSets
+from glotouch_bt.mission.nodes.base import EMPTY, StateSets
 from glotouch_bt.mission.nodes.timeout import ClockTimeout
 from glotouch_bt.mission.read.parse import parse_tree
 from glotouch_bt.mission.read.scope import Scope
@@ -296,7 +298,7 @@ def by_sets(spec: NodeSpec) -> tuple[DataFlow, set[tuple[str, str, str]], set[tu
     for requirement, looked in flow.looked.items():
         if not requirement.stops:
             continue
-        for value in variables.sets.values(looked, requirement.variable) - requirement.good:
+        for value in flow.sets.values(looked, requirement.variable) - requirement.good:
             state = variables.state_names("hand")[value] if requirement.of_resource else "unset"
             wrong.add((requirement.node.name, requirement.port, state))
     ends = set()
@@ -306,13 +308,11 @@ def by_sets(spec: NodeSpec) -> tuple[DataFlow, set[tuple[str, str, str]], set[tu
                 for b in (False, True):
                     kept = end
                     if "hand" in variables.resources:
-                        kept = variables.sets.where(
-                            kept, variables.resources["hand"], (variables.state("hand", state),)
-                        )
+                        kept = flow.sets.where(kept, variables.resources["hand"], (variables.state("hand", state),))
                     for key, is_set in (("a", a), ("b", b)):
                         if key in variables.keys:
                             values = variables.written(key) if is_set else (0,)
-                            kept = variables.sets.where(kept, variables.keys[key], values)
+                            kept = flow.sets.where(kept, variables.keys[key], values)
                         elif is_set:
                             kept = EMPTY
                     if kept != EMPTY:
@@ -348,9 +348,7 @@ def test_the_path_shown_is_the_shortest_there_is(tree: Any) -> None:
     variables = flow.variables
     loops = any(n.kind == "for_each" for n in spec.walk())
     for requirement, looked in flow.looked.items():
-        for value in (
-            variables.sets.values(looked, requirement.variable) - requirement.good if requirement.stops else ()
-        ):
+        for value in flow.sets.values(looked, requirement.variable) - requirement.good if requirement.stops else ():
             path = shortest_path(
                 flow, Goal(requirement.node, requirement.port, requirement.variable, frozenset({value}))
             )
@@ -359,6 +357,27 @@ def test_the_path_shown_is_the_shortest_there_is(tree: Any) -> None:
             state = variables.state_names("hand")[value] if requirement.of_resource else "unset"
             if whole and not loops:
                 assert len(path) - 1 == seen[requirement.node.name, requirement.port, state], path
+
+
+@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
+@given(tree=TREES)
+def test_variables_that_decide_nothing_need_not_be_followed(tree: Any) -> None:
+    """The same nodes are entered and end alike, and a tree has findings with all variables only if it has some here."""
+    spec = read(tree)
+    variables = variables_of(spec)
+    requirements = all_requirements(spec, variables)
+    exact, quick = DataFlow(spec, variables, requirements), projected(spec, variables, requirements)
+    assert quick.entered == exact.entered
+    assert quick.ends == exact.ends
+    for requirement in exact.looked:
+        found, other = exact.found(requirement), quick.found(requirement)
+        assert found == other or (found < other and not quick.sets.follows(requirement.variable))
+    shown, everything = Findings(), Findings()
+    judge.check_flow(spec, SKILLS, shown, {}, 60.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge, "projected", DataFlow)
+        judge.check_flow(spec, SKILLS, everything, {}, 60.0)
+    assert shown.sorted() == everything.sorted()
 
 
 def holds(algebra: StateSets, given: int, state: tuple[int, ...]) -> bool:
@@ -375,7 +394,7 @@ def holds(algebra: StateSets, given: int, state: tuple[int, ...]) -> bool:
 def test_diagrams_are_sets(sizes: list[int], steps: list[tuple[int, int, int, int]]) -> None:
     """Every operation of `StateSets` against plain sets of tuples."""
     algebra = StateSets(sizes)
-    kept: list[tuple[int, set[tuple[int, ...]]]] = [(EMPTY, set()), (START, {(0,) * len(sizes)})]
+    kept: list[tuple[int, set[tuple[int, ...]]]] = [(EMPTY, set()), (algebra.start, {(0,) * len(sizes)})]
     for operation, variable, bits, which in steps:
         variable %= len(sizes)
         values = [v for v in range(sizes[variable]) if bits >> v & 1]

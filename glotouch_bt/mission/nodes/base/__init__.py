@@ -32,5 +32,6 @@ from glotouch_bt.mission.nodes.base.kind import (
 from glotouch_bt.mission.nodes.base.loop import LoopKind, Pass
 from glotouch_bt.mission.nodes.base.requirements import port_requirement
 from glotouch_bt.mission.nodes.base.run_count import RunCount
-from glotouch_bt.mission.nodes.base.state_sets import EMPTY, START, StateSets
+from glotouch_bt.mission.nodes.base.state_sets import EMPTY, StateSets
 from glotouch_bt.mission.nodes.base.state_variables import ANYTHING, UNSET, StateVariables, ValueKind
+from glotouch_bt.mission.nodes.base.value_sets import ValueSets

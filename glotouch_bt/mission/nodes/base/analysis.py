@@ -9,6 +9,7 @@ from typing import Any, Literal, Protocol
 from glotouch_bt.mission.nodes.base.comparison import ConditionSettings
 from glotouch_bt.mission.nodes.base.state_sets import EMPTY, StateSets
 from glotouch_bt.mission.nodes.base.state_variables import StateVariables
+from glotouch_bt.mission.nodes.base.value_sets import ValueSets
 from glotouch_bt.mission.spec import NodeSpec, Place
 
 Values = tuple[int, ...]
@@ -75,7 +76,7 @@ class DataFlowAnalysis(Protocol):
     """The data-flow analysis of one tree, as a node kind uses it to compute its exit states."""
 
     @property
-    def sets(self) -> StateSets:
+    def sets(self) -> StateSets | ValueSets:
         """The algebra of sets of states."""
 
     @property

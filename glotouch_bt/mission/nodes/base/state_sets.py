@@ -12,25 +12,31 @@ off the C stack, so that the interpreter's recursion limit may be raised for it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from itertools import accumulate
 
 EMPTY = 0
 """The empty set of states."""
-START = 1
-"""The set of the one state in which all variables are 0."""
 
 
 class StateSets:
-    """The algebra of sets of states over some variables. A set is an int: `EMPTY`, `START`, or another.
+    """The algebra of sets of states over some variables. A set is an int: `EMPTY`, `start`, or another.
 
     Args:
         sizes: Number of values of each variable. Later variables are tested first: those written late in a mission are
             then near the top, where they cost least.
+        followed: Variables that are followed; None: all. The value of any other variable is ignored: a set then stands
+            for its projection onto the followed variables.
+
+    Attributes:
+        start: The set of the one state in which all variables are 0.
     """
 
-    def __init__(self, sizes: Sequence[int]) -> None:
+    start = 1
+
+    def __init__(self, sizes: Sequence[int], followed: Collection[int] | None = None) -> None:
         self._sizes = tuple(sizes)
+        self._ignored = frozenset() if followed is None else frozenset(range(len(self._sizes))) - frozenset(followed)
         self._first = [0, *accumulate(self._sizes)]  # bit of each variable's value 0 in `_held`
         self._nodes: list[tuple[int, tuple[int, ...]]] = [(-1, ()), (-1, ())]
         self._held = [0, sum(1 << bit for bit in self._first[:-1])]  # each node's values of all variables, as bits
@@ -98,7 +104,7 @@ class StateSets:
 
     def where(self, given: int, variable: int, values: Iterable[int]) -> int:
         """Return the states in which a variable has one of some values."""
-        return self._where(given, variable, _bits(values))
+        return given if variable in self._ignored else self._where(given, variable, _bits(values))
 
     def _where(self, given: int, variable: int, bits: int) -> int:
         held = self._values(given, variable)
@@ -119,11 +125,15 @@ class StateSets:
 
     def assign(self, given: int, variable: int, value: int) -> int:
         """Return all states, with a variable set to a value."""
-        return self._write(given, variable, 1 << value, keep=False)
+        return given if variable in self._ignored else self._write(given, variable, 1 << value, keep=False)
 
     def allow(self, given: int, variable: int, values: Iterable[int]) -> int:
         """Return all states as they are, and with a variable set to any of some values."""
-        return self._write(given, variable, _bits(values), keep=True)
+        return given if variable in self._ignored else self._write(given, variable, _bits(values), keep=True)
+
+    def follows(self, variable: int) -> bool:
+        """Return True if a variable is followed."""
+        return variable not in self._ignored
 
     def _write(self, given: int, variable: int, bits: int, keep: bool) -> int:
         """Set a variable to each value in `bits`; with `keep`, keep the states as they are as well."""

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from glotouch_bt.mission.nodes.base.state_sets import StateSets
-
 UNSET, ANYTHING = 0, 1
 """Values of every key's variable: not written, and written with a value of an unknown kind."""
 
@@ -44,14 +42,14 @@ class ValueKind:
 
 
 class StateVariables:
-    """The variables of a tree and the sets over them.
+    """The variables of a tree.
 
     Args:
         kinds: Every kind of value that each key may hold.
         states: Every state of each resource, the first state first.
 
     Attributes:
-        sets: The algebra.
+        sizes: Number of values of each variable.
         keys: Variable of each key.
         resources: Variable of each resource.
         lost: Variable that is 1 once an unknown node may have run.
@@ -64,8 +62,7 @@ class StateVariables:
         self.keys = {key: i for i, key in enumerate(kinds)}
         self.resources = {name: len(self.keys) + i for i, name in enumerate(self._states)}
         self.lost = len(self.keys) + len(self.resources)
-        sizes = [*(len(k) for k in self._kinds.values()), *(len(s) for s in self._states.values()), 2]
-        self.sets = StateSets(sizes)
+        self.sizes = (*(len(k) for k in self._kinds.values()), *(len(s) for s in self._states.values()), 2)
 
     def kind(self, key: str, value: int) -> ValueKind:
         """Return what a value of a key's variable stands for."""
