@@ -246,3 +246,29 @@ def test_what_is_too_long_for_one_object_is_two(world_of: WorldOf) -> None:
         assert (len(state.raw), len(state.outliers)) == (5, 3)
         np.testing.assert_allclose(state.outline().centre_K_m, CENTRE, atol=1e-3)
         assert not state.keep_one(state.outline(), TraceParams())
+
+
+def test_the_end_of_an_unnoticed_contact_is_no_other_object(world_of: WorldOf) -> None:
+    """The tool was pushed against the disc with too little force. When it leaves, the force changes inwards."""
+    world = world_of([cylinder(0.03)], [(*CENTRE, 0)])
+    first = touched_from(world, 0.7)
+    places = []
+
+    def execute(move: Move) -> MoveOutcome:
+        outcome = world.execute(move)
+        if places or move.kind != "step" or outcome.contact is not None:
+            return outcome
+        out = np.append(world.tip_K_m - centres_of(world)[0], 0.0)
+        out /= np.linalg.norm(out)
+        places.append(centres_of(world)[0] + (0.03 + TIP) * out[:2])
+        world.tip_K_m = places[0]
+        tip = np.array([*places[0], 0.018])
+        turned = np.array([-out[1], out[0], 0.0])
+        met = Contact(0.0, tip, turned, -out, tip[:2] + TIP * out[:2], 0.2)
+        return replace(outcome, contact=met, path_K_m=np.vstack([outcome.path_K_m, places[0]]))
+
+    result = drive(trace(first, world.tip_K_m, TIP, None, half_extent_m=INNER), execute)
+    assert places
+    assert result.outliers == ()
+    assert result.contour is not None
+    np.testing.assert_allclose(result.contour.centre_K_m, centres_of(world)[0], atol=3e-4)

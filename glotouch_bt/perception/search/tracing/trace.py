@@ -165,9 +165,13 @@ def _until_known(
                 missed = 0
         else:
             missed += 1
-            s.outliers.append(found)
-            s.blocked.append(bearing)
-            s.record((yield Move("retreat", s.tip + p.clearance_m * unit(found.reaction_K[:2]))))
+            out = found.reaction_K[:2]
+            if s.released(outline, found, p):
+                out = s.tip - outline.centre_K_m
+            else:
+                s.outliers.append(found)
+                s.blocked.append(bearing)
+            s.record((yield Move("retreat", s.tip + p.clearance_m * unit(out))))
         if missed > p.misses:
             ended = f"{missed} probes in a row told nothing"
         outline = s.outline()

@@ -239,16 +239,31 @@ class TraceState:
         points = np.array([c.point_K_m for c in self.present()])
         if float(np.linalg.norm(points - contact.point_K_m, axis=1).min()) < p.between_m:
             return True
-        off = contact.tip_K_m[:2] - outline.centre_K_m
-        far = float(np.hypot(off[0], off[1]))
-        if float(contact.reaction_K[:2] @ off) < p.facing * far:
+        if self._faces_centre(outline, contact, p):
             return False
+        off = contact.tip_K_m[:2] - outline.centre_K_m
         distance, sd = self.ring(outline, np.array([np.arctan2(off[1], off[0])]), p)
-        if far < float(distance[0]) + p.own_m + 2.0 * float(sd[0]):
+        if float(np.hypot(off[0], off[1])) < float(distance[0]) + p.own_m + 2.0 * float(sd[0]):
             return True
         one = self.outline((contact,)).log_evidence - outline.log_evidence
         two = self.outline((contact,), alone=True).log_evidence
         return bool(one > two + np.log(p.other))
+
+    def released(self, outline: OutlineBelief, contact: Contact, p: TraceParams) -> bool:
+        """Return True if the force changed because the tool left this object, not because it met another one.
+
+        A light object can be pushed along with too little force to be noticed. The next move then starts in contact,
+        and the force that ends seems to point towards the object. The tool is where the outline is predicted, nearer
+        than it would pass.
+        """
+        off = contact.tip_K_m[:2] - outline.centre_K_m
+        distance, _ = self.ring(outline, np.array([np.arctan2(off[1], off[0])]), p)
+        near = float(np.hypot(off[0], off[1])) < float(distance[0]) + 0.5 * p.clearance_m
+        return near and self._faces_centre(outline, contact, p)
+
+    def _faces_centre(self, outline: OutlineBelief, contact: Contact, p: TraceParams) -> bool:
+        off = contact.tip_K_m[:2] - outline.centre_K_m
+        return bool(contact.reaction_K[:2] @ off < p.facing * np.hypot(off[0], off[1]))
 
     def surprising(self, outline: OutlineBelief, contact: Contact, p: TraceParams) -> bool:
         """Return True if a contact is far from the predicted outline."""
