@@ -79,17 +79,17 @@ def next_probe_touch(belief: Belief, options: Sequence[ProbeOption]) -> ProbeOpt
 def pays_now(belief: Belief, option: ProbeOption, unmeasured: set[int]) -> bool:
     """Return True if it is expected to save time to measure a candidate now, and not once the jaws have been used.
 
-    If it is the target, measuring it later costs `CHANGE_S` more. If the target is one of those measured completely,
-    its own time is saved.
+    If it is the target, measuring it later costs `CHANGE_S` more. If the target is one of those measured before, its
+    own time is saved. The likeliest candidate counts as measured before all others.
 
     Args:
         belief: What is known.
         option: What is left to measure of the candidate.
         unmeasured: All candidates that were not measured completely.
     """
-    share = {m.index: m.probability for m in belief.ranking.matches}
-    measured = sum(p for i, p in share.items() if i not in unmeasured)
-    return share[option.touch.candidate] * CHANGE_S >= measured * (option.seconds + option.more_s)
+    share, index = {m.index: m.probability for m in belief.ranking.matches}, option.touch.candidate
+    before = sum(p for i, p in share.items() if i not in unmeasured or i == best_of(belief).index)
+    return index == best_of(belief).index or share[index] * CHANGE_S >= before * (option.seconds + option.more_s)
 
 
 def wanted(belief: Belief, confidence: float, hopeless: frozenset[int]) -> set[int]:

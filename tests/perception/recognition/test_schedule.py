@@ -121,7 +121,8 @@ def test_what_is_probably_not_needed_is_put_off(target, model, seconds: float) -
     now_s = (share[0] + share[1]) * seconds
     later_s = share[1] * (CHANGE_S + seconds)
     assert pays_now(belief, option(1, "top", seconds), {1}) == (now_s <= later_s)
-    assert pays_now(belief, option(1, "top", seconds), {0, 1}), "nothing was measured yet"
+    assert pays_now(belief, option(0, "top", seconds), {0, 1}), "the likeliest one"
+    assert pays_now(belief, option(1, "top", seconds), {0, 1}) == (now_s <= later_s), "the likeliest one comes first"
 
 
 def test_time_counts(target, model) -> None:
