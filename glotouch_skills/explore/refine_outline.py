@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.perception.search import TraceParams, lost_among, refined, trace_more
+from glotouch_bt.perception.search import TraceParams, lost_among, of_another, refined, trace_more
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
@@ -67,6 +68,7 @@ class RefineOutline(Skill):
         anew = before.index in (self.anew or ())
         self.refined = before
         others = tuple(c for c in self.known or () if c.index != before.index)
+        radius = tool.tip_radius_m if tool.round else 0.0
         explorer = Explorer(self.context, tool, p.speeds(), self.event)
         half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - p.wall_gap_m
         plan = trace_more(
@@ -78,6 +80,7 @@ class RefineOutline(Skill):
             half_extent_m=half,
             columns=explorer.columns,
             anew=anew,
+            elsewhere=partial(of_another, others, radius),
         )
         traced = yield from explorer.run(plan)
         better = refined(before, traced)

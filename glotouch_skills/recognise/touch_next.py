@@ -96,7 +96,7 @@ class TouchNext(Skill):
     touchsets = Out(tuple, "touches, one TouchSet for each candidate", element=TouchSet)
     refused = Out(tuple, "closures that could not be made: candidate, yaw in degrees, height and place in mm")
     doubtful = Out(
-        tuple, "indices of candidates on which closures met something: not where they were traced", element=int
+        tuple, "indices of candidates on which closures met something, and none since felt them as traced", element=int
     )
     cramped = Out(
         tuple, "indices of candidates on which closures lack only space, most probable first", element=int, always=True
@@ -304,6 +304,8 @@ class TouchNext(Skill):
                 raise
         if (moved := disturbance(hand.candidate, layer, object_motion)) is not None:
             self.event("object_moved", **moved)
+        elif layer.stable:  # it is where it was traced
+            self.doubtful = tuple(i for i in self.doubtful if i != index)
         return hand, layer
 
     def _rise(self, down: Squeezing | None) -> Motion[None]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import count
 from typing import Any
 
@@ -18,6 +18,7 @@ from glotouch_bt.perception.search import (
     SearchMap,
     SearchPolicy,
     lost_among,
+    of_another,
     refined,
     seek,
     trace_bodies,
@@ -145,13 +146,13 @@ def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDG
     tracing, half = _defaults("refine_outline").rule(), explored.belief.half_extent_m
     out, execute = list(explored.found), _limited(world, budget_m)
     for i, traced in sorted(enumerate(explored.found), key=lambda item: item[1].candidate.quality):
-        known = traced.candidate.contacts
-        more = trace_more(known, world.tip_K_m, world.tip_radius_m, tracing, half_extent_m=half)
+        others = tuple(t.candidate for j, t in enumerate(out) if j != i)
+        known, elsewhere = traced.candidate.contacts, partial(of_another, others, world.tip_radius_m)
+        more = trace_more(known, world.tip_K_m, world.tip_radius_m, tracing, half_extent_m=half, elsewhere=elsewhere)
         try:
             better = refined(traced.candidate, drive(more, execute))
         except _OutOfBudget:
             break
-        others = tuple(t.candidate for j, t in enumerate(out) if j != i)
         if better is not None and not lost_among(traced.candidate, better, others):
             out[i] = Traced(world.travel_m, better)
     return tuple(out)

@@ -8,7 +8,14 @@ from itertools import chain, count
 
 import numpy as np
 
-from glotouch_bt.perception.search.bodies import bodies, count_doubtful, doubtful_pairs, outline_of, same_body
+from glotouch_bt.perception.search.bodies import (
+    SEPARATE_NATS,
+    bodies,
+    count_doubtful,
+    doubtful_pairs,
+    outline_of,
+    same_body,
+)
 from glotouch_bt.perception.search.map import FACING, SearchMap
 from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams
 from glotouch_bt.perception.touch import (
@@ -225,11 +232,21 @@ def joins(known: tuple[Candidate, ...], contacts: tuple[Contact, ...], radius_m:
     return any(max(outline_of((*old.contacts, *contacts), radius_m).contour.size_m) <= MAX_LENGTH_M for old in near)
 
 
-def of_another(belief: SearchMap, known: tuple[Candidate, ...], contact: Contact) -> bool:
-    """Return True if a contact made during a trace belongs to a wall or to another, well-traced candidate."""
-    return belief.at_wall(contact) or any(
-        float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < ON_M and _is_well_traced(c) for c in known
-    )
+def of_another(known: tuple[Candidate, ...], radius_m: float, contacts: tuple[Contact, ...], contact: Contact) -> bool:
+    """Return True if a new contact of a trace belongs to another candidate: it lies near one that explains it better.
+
+    Args:
+        known: The other candidates.
+        radius_m: Radius of the ball; 0 for another section.
+        contacts: Contacts of the trace.
+        contact: The new one.
+    """
+
+    def gain(of: tuple[Contact, ...]) -> float:
+        return outline_of((*of, contact), radius_m).log_evidence - outline_of(of, radius_m).log_evidence
+
+    near = [c for c in known if float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < SAME_M]
+    return bool(near) and max(gain(c.contacts) for c in near) - gain(contacts) > SEPARATE_NATS
 
 
 def _is_well_traced(candidate: Candidate) -> bool:

@@ -7,7 +7,7 @@ from functools import partial
 from glotouch_bt.perception.search.candidates import Admitted, admit, joins, of_another, part_of, regroup
 from glotouch_bt.perception.search.map import SearchMap
 from glotouch_bt.perception.search.moves import SearchPlan
-from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams, trace, trace_more
+from glotouch_bt.perception.search.tracing import Elsewhere, OutlineTrace, TraceParams, trace, trace_more
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.robot import Array
 
@@ -41,6 +41,10 @@ def trace_bodies(
     """
     radius = tip_radius_m if round_tip else 0.0
     old = part_of(known, first, radius)
+
+    def elsewhere(others: tuple[Candidate, ...]) -> Elsewhere:
+        return lambda mine, contact: belief.at_wall(contact) or of_another(others, radius, mine, contact)
+
     traced = yield from trace(
         first,
         tip_K_m,
@@ -49,7 +53,7 @@ def trace_bodies(
         round_tip=round_tip,
         half_extent_m=belief.half_extent_m,
         known=() if old is None else old.contacts,
-        elsewhere=partial(of_another, belief, tuple(c for c in known if c is not old)),
+        elsewhere=elsewhere(tuple(c for c in known if c is not old)),
         joined=partial(joins, known, radius_m=radius) if old is None else None,
     )
     admitted = admit(belief, known, first, traced, height_m, exclusion_m, part_of=old)
@@ -65,7 +69,7 @@ def trace_bodies(
             params,
             round_tip=round_tip,
             half_extent_m=belief.half_extent_m,
-            elsewhere=partial(of_another, belief, rest),
+            elsewhere=elsewhere(rest),
         )
         admitted = regroup(admitted, whole.index, part.index, more, exclusion_m)
     return admitted, traced

@@ -103,7 +103,9 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 belief, side, tip, lowered = yield from _from_its_side(belief, outcome)
             if side is not None:
                 outcome = yield Move("retreat", tip - RETREAT_M * side.approach_K[:2])
-                return Sought(belief.with_path(outcome.path_K_m), side, True)
+                tip, belief = outcome.tip_K_m, belief.with_path(outcome.path_K_m)
+                if not belief.knows(side):
+                    return Sought(belief, side, True)
             belief = belief.with_dropped(place)
             break
         else:

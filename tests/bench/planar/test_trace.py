@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ import trimesh
 
 from glotouch_bt.bench.planar import ContactModel, PlanarWorld
 from glotouch_bt.motion import drive
-from glotouch_bt.perception.search import Move, MoveOutcome, OutlineTrace, TraceParams, trace, trace_more
+from glotouch_bt.perception.search import Move, MoveOutcome, OutlineTrace, TraceParams, of_another, trace, trace_more
+from glotouch_bt.perception.search.bodies import outline_of
+from glotouch_bt.perception.search.candidates import quality
 from glotouch_bt.perception.search.tracing.trace_state import TraceState
-from glotouch_bt.perception.touch import Contact
+from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.robot.scene.meshes import Mesh
 from glotouch_skills.explore.orbit_probe import OrbitProbeParams
 from glotouch_skills.explore.refine_outline import RefineOutlineParams
@@ -230,6 +233,29 @@ def test_refining_finds_every_limb(world_of: WorldOf) -> None:
                 landed += up
     assert found >= 5
     assert landed > 0
+
+
+@pytest.mark.parametrize(("angle", "seed"), [(1.3, 1), (2.4, 2)])
+def test_refining_beside_a_neighbour_keeps_to_its_object(world_of: WorldOf, angle: float, seed: int) -> None:
+    """A disc stands 14 mm off a limb: the ball passes, and contacts with both are nearer than parts of one may be."""
+    middle, along = np.array([0.0, -0.03]), np.array([np.cos(0.3), np.sin(0.3)])
+    disc = middle + (0.034 + 0.014 + 0.030) * along
+    world = world_of([three_limbs(), cylinder(0.03)], [(*middle, 0.3), (*disc, 0)], ContactModel(), seed=seed)
+    world.lowered, world.tip_K_m = True, disc + 0.06 * along
+    met = world.execute(Move("sweep", disc)).contact
+    assert met is not None
+    contacts = traced(world, met, OrbitProbeParams().rule()).contacts
+    outline = outline_of(contacts, TIP)
+    neighbour = Candidate(1, outline.contour, 0.018, quality(outline), contacts)
+    coarse = TraceParams(centre_sd_m=6e-3, radial_sd_m=0.0225, min_contacts=4, max_contacts=5)
+    before = traced(world, touched_from(world, angle), coarse)
+    rule, elsewhere = RefineOutlineParams().rule(), partial(of_another, (neighbour,), TIP)
+    plan = trace_more(before.contacts, world.tip_K_m, TIP, rule, half_extent_m=INNER, elsewhere=elsewhere)
+    result = drive(plan, world.execute)
+    tips = np.array([c.tip_K_m[:2] for c in result.contacts])
+    assert (np.abs(world.clearance(tips, 0)) < np.abs(world.clearance(tips, 1))).all()
+    assert result.contour is not None
+    assert float(np.linalg.norm(result.contour.centre_K_m - centres_of(world)[0])) < 3e-3
 
 
 def test_what_is_too_long_for_one_object_is_two(world_of: WorldOf) -> None:

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit, joins, lost_among, part_of
+from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit, joins, lost_among, of_another, part_of
 from glotouch_bt.perception.search.bodies import outline_of
 from glotouch_bt.perception.search.candidates import quality
 from glotouch_bt.perception.touch import Candidate, Contact
@@ -177,3 +177,28 @@ def test_a_trace_that_became_one_with_a_neighbour_is_not_the_candidate():
     assert not lost_among(dataclasses.replace(strayed, contour=beside), strayed, ())
     part = outline_of(ring(0.010, 0.0, 0.01, [0.0, 90.0, 180.0, 270.0]), R).contour
     assert not lost_among(dataclasses.replace(strayed, contour=part), strayed, (neighbour,))
+
+
+NEIGHBOUR = (0.0, 90.0, 180.0, 270.0)
+"""Bearings, in degrees, of four contacts all round a disc, as a coarse trace makes them."""
+
+
+@pytest.mark.parametrize(
+    ("new", "another"),
+    [
+        (ring(0.070, 0.0, 0.03, [180.0]), True),  # on the neighbour, in the gap of 10 mm
+        (ring(0.070, 0.0, 0.03, [150.0]), True),
+        (ring(0.0, 0.0, 0.03, [0.0]), False),  # on the disc itself, in the gap
+        (ring(0.0, 0.0, 0.03, [30.0]), False),
+        (ring(0.0, 0.0, 0.03, [200.0]), False),  # on its far side
+    ],
+    ids=["neighbour", "neighbour, aside", "itself", "itself, aside", "itself, far side"],
+)
+def test_a_contact_in_the_gap_between_two_discs_belongs_to_the_one_that_was_met(new, another):
+    """Discs of 60 mm about (0, 0) and (70, 0) mm; neither was touched in the gap before."""
+    contacts = ring(0.070, 0.0, 0.03, NEIGHBOUR[:2] + NEIGHBOUR[3:])
+    outline = outline_of(contacts, R)
+    neighbour = Candidate(1, outline.contour, 0.018, quality(outline), contacts)
+    mine = ring(0.0, 0.0, 0.03, [60.0, 120.0, 180.0, 240.0, 300.0])
+    assert of_another((neighbour,), R, mine, new[0]) == another
+    assert not of_another((), R, mine, new[0])

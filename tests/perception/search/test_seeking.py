@@ -167,6 +167,27 @@ def test_landing_on_something_it_is_touched_from_its_side() -> None:
     assert moves[-1].kind == "retreat"
 
 
+def test_a_side_of_a_traced_object_below_a_landing_is_no_find() -> None:
+    """The ball lands on something beside a traced object; lowered next to it, it meets that object's side."""
+    start, landing, side = np.array([-0.1, 0.1]), np.array([-0.01, 0.0]), np.array([0.015, 0.0])
+    known = blank().with_exclusion(DISC, 0.01)
+
+    def answer(move: Move, tip: Array) -> MoveOutcome:
+        if move.kind == "hop" and np.allclose(move.goal_K_m, landing):
+            up = np.array([0.0, 0.0, 1.0])
+            down = Contact(0.0, np.array([*landing, 0.05]), -up, up, landing, 1.0)
+            return MoveOutcome(landing, np.zeros((0, 2)), down)
+        if move.kind == "probe":
+            return MoveOutcome(side, np.array([tip, side]), touch(side, np.array([1.0, 0.0])))
+        return free(move, tip)
+
+    policy = Towards((float(landing[0]), float(landing[1])), raised=True)
+    sought, moves = run(seek(known, policy, start, lowered=False), start, answer)
+    assert "probe" in [m.kind for m in moves]
+    assert sought.contact is None
+    assert np.linalg.norm(sought.belief.dropped - landing, axis=1).min() < 1e-9
+
+
 def test_a_hint_is_followed_before_the_policy_is_asked() -> None:
     start, place = np.array([-0.1, 0.0]), np.array([0.06, 0.0])
     hint = touch(place, np.array([1.0, 0.0]))

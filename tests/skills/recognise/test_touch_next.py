@@ -57,14 +57,15 @@ class Oracle:
 @pytest.fixture
 def make(bench, found, folder, monkeypatch):
     def make_one(
-        oracle, things=None, grip_width_m=WIDTH, stuff=(), tip_P_m=0.13, probed=None, felt=None, refused=None, **params
-    ):
+        oracle, things=None, grip_width_m=WIDTH, stuff=(), tip_P_m=0.13, probed=None, felt=None, refused=None,
+        doubtful=None, **params
+    ):  # fmt: skip
         b = bench(grip_width_m=grip_width_m, things=stuff, tip_P_m=tip_P_m)
         b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
         monkeypatch.setattr(module.recognition, "infer_belief", oracle.infer_belief)
         monkeypatch.setattr(module.recognition, "expected_gain", oracle.expected_gain)
         things = things or (found.round((0.0, -0.08), 0.025), found.round((0.0, 0.08), 0.025, index=1))
-        optional = {"probed": probed, "felt": felt, "refused_before": refused}
+        optional = {"probed": probed, "felt": felt, "refused_before": refused, "doubtful_before": doubtful}
         given = {"candidates": things} | {k: v for k, v in optional.items() if v is not None}
         return b, b.make(TouchNext, inputs=given, target="can", **params)
 
@@ -264,6 +265,14 @@ def test_fingers_on_something_cost_a_choice_not_the_mission(make, things) -> Non
     assert skill.doubtful == (0, 1), "what the fingers met is not where it was traced"
     assert b.of_kind("note")
     assert pads_height(b) > 0.13
+
+
+def test_what_is_felt_where_it_was_traced_is_doubted_no_more(make) -> None:
+    """Candidate 1 is closed on and stays in its place; the other one is not touched."""
+    b, skill = make(Oracle(right=1, enough=3), doubtful=(0, 1))
+    repeat(b, skill)
+    assert not b.of_kind("object_moved")
+    assert skill.doubtful == (0,)
 
 
 def test_fingers_on_a_low_ledge_close_above_it(make, things) -> None:

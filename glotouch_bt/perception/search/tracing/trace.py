@@ -15,6 +15,8 @@ from glotouch_bt.perception.touch import Contact
 from glotouch_bt.perception.touch.outline import OutlineBelief, wrapped
 from glotouch_bt.robot import Array
 
+Elsewhere = Callable[[tuple[Contact, ...], Contact], bool]
+"""Called with the contacts of a trace and a new one; returns True if that belongs to another, known object."""
 MIN_MORE = 3
 """Minimum number of new contacts with an object traced before."""
 BESIDE_RAD = np.deg2rad(10.0)
@@ -38,7 +40,7 @@ def trace(
     round_tip: bool = True,
     half_extent_m: Array | None = None,
     known: tuple[Contact, ...] = (),
-    elsewhere: Callable[[Contact], bool] | None = None,
+    elsewhere: Elsewhere | None = None,
     joined: Callable[[tuple[Contact, ...]], bool] | None = None,
 ) -> SearchPlan[OutlineTrace]:
     """Trace the outline of a touched object. The ball ends beside it, at sensing height.
@@ -51,7 +53,7 @@ def trace(
         round_tip: The section is a disc: fit outlines to its centres, else to the contact points.
         half_extent_m: (2,) limits of |x| and |y| of the ball's centre in K; None: no walls near.
         known: Earlier contacts with the same object, at its current position.
-        elsewhere: Returns True if a contact belongs to another, known object.
+        elsewhere: See `Elsewhere`.
         joined: Returns True if the contacts belong to a known object, which ends the trace.
     """
     p = params or TraceParams()
@@ -71,7 +73,7 @@ def trace_more(
     half_extent_m: Array | None = None,
     columns: Callable[[], Array] | None = None,
     anew: bool = False,
-    elsewhere: Callable[[Contact], bool] | None = None,
+    elsewhere: Elsewhere | None = None,
 ) -> SearchPlan[OutlineTrace]:
     """Continue the trace of an object from above: hop to where the outline is least certain.
 
@@ -97,8 +99,11 @@ def trace_more(
             s.record(outcome)
             met = outcome.contact
         if met is not None and anew:
-            return (yield from trace(met, s.tip, tip_radius_m, p, round_tip=round_tip, half_extent_m=half_extent_m))
-        if met is not None and not (elsewhere and elsewhere(met)) and s.belongs(outline, met, p):
+            plan = trace(
+                met, s.tip, tip_radius_m, p, round_tip=round_tip, half_extent_m=half_extent_m, elsewhere=elsewhere
+            )
+            return (yield from plan)
+        if met is not None and not (elsewhere and elsewhere(s.present(), met)) and s.belongs(outline, met, p):
             s.add(met, outline, p)
             yield from _retreat(s, p)
             return (yield from _until_known(s, p, elsewhere))
@@ -125,7 +130,7 @@ def _apart(worth: Array, n: int) -> list[int]:
 def _until_known(
     s: TraceState,
     p: TraceParams,
-    elsewhere: Callable[[Contact], bool] | None = None,
+    elsewhere: Elsewhere | None = None,
     joined: Callable[[tuple[Contact, ...]], bool] | None = None,
 ) -> SearchPlan[OutlineTrace]:
     """Probe from beside the object until the outline is known.
@@ -153,7 +158,7 @@ def _until_known(
         if found is None:
             missed += 1
             s.blocked.append(bearing)
-        elif not (elsewhere is not None and elsewhere(found)) and (beside or s.belongs(outline, found, p)):
+        elif not (elsewhere is not None and elsewhere(s.present(), found)) and (beside or s.belongs(outline, found, p)):
             if s.near(found, p.same_m):
                 missed += 1
                 s.blocked.append(bearing)
