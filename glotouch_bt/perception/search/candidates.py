@@ -9,6 +9,7 @@ from itertools import chain, count
 import numpy as np
 
 from glotouch_bt.perception.search.bodies import (
+    KNOWN_QUALITY,
     SEPARATE_NATS,
     bodies,
     count_doubtful,
@@ -235,6 +236,8 @@ def joins(known: tuple[Candidate, ...], contacts: tuple[Contact, ...], radius_m:
 def of_another(known: tuple[Candidate, ...], radius_m: float, contacts: tuple[Contact, ...], contact: Contact) -> bool:
     """Return True if a new contact of a trace belongs to another candidate: it lies near one that explains it better.
 
+    A candidate that is hardly known is no other: it may be a part of the object that is traced.
+
     Args:
         known: The other candidates.
         radius_m: Radius of the ball; 0 for another section.
@@ -245,8 +248,12 @@ def of_another(known: tuple[Candidate, ...], radius_m: float, contacts: tuple[Co
     def gain(of: tuple[Contact, ...]) -> float:
         return outline_of((*of, contact), radius_m).log_evidence - outline_of(of, radius_m).log_evidence
 
-    near = [c for c in known if float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < SAME_M]
-    return bool(near) and max(gain(c.contacts) for c in near) - gain(contacts) > SEPARATE_NATS
+    return any(
+        c.quality >= KNOWN_QUALITY
+        and float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < SAME_M
+        and gain(c.contacts) - gain(contacts) > SEPARATE_NATS
+        for c in known
+    )
 
 
 def _is_well_traced(candidate: Candidate) -> bool:

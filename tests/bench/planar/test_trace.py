@@ -235,12 +235,11 @@ def test_refining_finds_every_limb(world_of: WorldOf) -> None:
     assert landed > 0
 
 
-@pytest.mark.parametrize(("angle", "seed"), [(1.3, 1), (2.4, 2)])
-def test_refining_beside_a_neighbour_keeps_to_its_object(world_of: WorldOf, angle: float, seed: int) -> None:
+def test_refining_beside_a_neighbour_keeps_to_its_object(world_of: WorldOf) -> None:
     """A disc stands 14 mm off a limb: the ball passes, and contacts with both are nearer than parts of one may be."""
     middle, along = np.array([0.0, -0.03]), np.array([np.cos(0.3), np.sin(0.3)])
     disc = middle + (0.034 + 0.014 + 0.030) * along
-    world = world_of([three_limbs(), cylinder(0.03)], [(*middle, 0.3), (*disc, 0)], ContactModel(), seed=seed)
+    world = world_of([three_limbs(), cylinder(0.03)], [(*middle, 0.3), (*disc, 0)], ContactModel(), seed=1)
     world.lowered, world.tip_K_m = True, disc + 0.06 * along
     met = world.execute(Move("sweep", disc)).contact
     assert met is not None
@@ -248,7 +247,7 @@ def test_refining_beside_a_neighbour_keeps_to_its_object(world_of: WorldOf, angl
     outline = outline_of(contacts, TIP)
     neighbour = Candidate(1, outline.contour, 0.018, quality(outline), contacts)
     coarse = TraceParams(centre_sd_m=6e-3, radial_sd_m=0.0225, min_contacts=4, max_contacts=5)
-    before = traced(world, touched_from(world, angle), coarse)
+    before = traced(world, touched_from(world, 1.3), coarse)
     rule, elsewhere = RefineOutlineParams().rule(), partial(of_another, (neighbour,), TIP)
     plan = trace_more(before.contacts, world.tip_K_m, TIP, rule, half_extent_m=INNER, elsewhere=elsewhere)
     result = drive(plan, world.execute)

@@ -179,10 +179,6 @@ def test_a_trace_that_became_one_with_a_neighbour_is_not_the_candidate():
     assert not lost_among(dataclasses.replace(strayed, contour=part), strayed, (neighbour,))
 
 
-NEIGHBOUR = (0.0, 90.0, 180.0, 270.0)
-"""Bearings, in degrees, of four contacts all round a disc, as a coarse trace makes them."""
-
-
 @pytest.mark.parametrize(
     ("new", "another"),
     [
@@ -196,9 +192,11 @@ NEIGHBOUR = (0.0, 90.0, 180.0, 270.0)
 )
 def test_a_contact_in_the_gap_between_two_discs_belongs_to_the_one_that_was_met(new, another):
     """Discs of 60 mm about (0, 0) and (70, 0) mm; neither was touched in the gap before."""
-    contacts = ring(0.070, 0.0, 0.03, NEIGHBOUR[:2] + NEIGHBOUR[3:])
+    contacts = ring(0.070, 0.0, 0.03, [250.0, 290.0, 0.0, 70.0, 110.0])
     outline = outline_of(contacts, R)
     neighbour = Candidate(1, outline.contour, 0.018, quality(outline), contacts)
     mine = ring(0.0, 0.0, 0.03, [60.0, 120.0, 180.0, 240.0, 300.0])
     assert of_another((neighbour,), R, mine, new[0]) == another
     assert not of_another((), R, mine, new[0])
+    hardly_known = dataclasses.replace(neighbour, quality=0.2)
+    assert not of_another((hardly_known,), R, mine, new[0]), "it may be a part of the same disc"
