@@ -9,14 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from glotouch_bt.perception.search.moves import Move, SearchPlan
-from glotouch_bt.perception.search.tracing.trace_params import TraceParams
+from glotouch_bt.perception.search.tracing.trace_params import Elsewhere, TraceParams
 from glotouch_bt.perception.search.tracing.trace_state import BEARINGS, OutlineTrace, TraceState, all_bearings, unit
 from glotouch_bt.perception.touch import Contact
 from glotouch_bt.perception.touch.outline import OutlineBelief, wrapped
 from glotouch_bt.robot import Array
 
-Elsewhere = Callable[[tuple[Contact, ...], Contact], bool]
-"""Called with the contacts of a trace and a new one; returns True if that belongs to another, known object."""
 MIN_MORE = 3
 """Minimum number of new contacts with an object traced before."""
 BESIDE_RAD = np.deg2rad(10.0)
@@ -85,8 +83,7 @@ def trace_more(
     """
     p = params or TraceParams()
     s = TraceState.begin(_still(known), tip_K_m, tip_radius_m, round_tip, half_extent_m)
-    s.known = s.given = len(known)
-    s.columns = columns or s.columns
+    s.known, s.given, s.columns = len(known), len(known), columns or s.columns
     outline, bearings = s.outline(), all_bearings()
     distance, sd = s.ring(outline, bearings, p)
     walled = np.any(np.abs(_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
@@ -99,9 +96,7 @@ def trace_more(
             s.record(outcome)
             met = outcome.contact
         if met is not None and anew:
-            plan = trace(
-                met, s.tip, tip_radius_m, p, round_tip=round_tip, half_extent_m=half_extent_m, elsewhere=elsewhere
-            )
+            plan = trace(met, s.tip, s.radius, p, round_tip=s.round, half_extent_m=s.half, elsewhere=elsewhere)
             return (yield from plan)
         if met is not None and not (elsewhere and elsewhere(s.present(), met)) and s.belongs(outline, met, p):
             s.add(met, outline, p)

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+
+from glotouch_bt.perception.touch import Contact
+
+Elsewhere = Callable[[tuple[Contact, ...], Contact], bool]
+"""Called with the contacts of a trace and a new one; returns True if that belongs to another, known object."""
 
 
 @dataclass(frozen=True, kw_only=True)
