@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -106,53 +106,53 @@ def width_ratios(
         sd = np.hypot(sd, unsure)
         known = nearest(model.certainty.width_known, model, l_m, z_m, turn)
     upper = np.array([o.layer.upper_only for o in seen])
-    each = [x.reshape(len(seen), -1) for x in (off, sd, known * _peak(seen, sd, p), _missed(known, p))]
+    peak, missed, bias = known * _peak(seen, sd, p), _missed(known, p), grid.bias_m.astype(np.float32)
     found, first = [], 0
     for last in np.cumsum([len(s) for s in sequences]).tolist():
-        total = np.zeros((len(grid.bias_m), sd[0].size), dtype=np.float32)
+        total = np.zeros((len(bias), *sd.shape[1:]), dtype=np.float32)
         for k in range(first, last, LAYERS_A_LOG):
             some = slice(k, min(k + LAYERS_A_LOG, last))
-            total += np.log(_width_products(*(x[some] for x in each), upper[some], grid.bias_m.astype(np.float32)))
-        parts = (None if x is None else x[first:last].transpose(0, 3, 2, 1) for x in (off, sd, known, unsure))
-        ratios = total.reshape(-1, *sd.shape[1:]).transpose(0, 3, 2, 1)
-        found.append((ratios, WidthVolumes(*parts)))
+            total += np.log(_width_products(off[some], sd[some], peak[some], missed[some], upper[some], bias))
+        volumes = WidthVolumes(*(x[first:last].transpose(0, 3, 2, 1) for x in (off, sd, known)))
+        if unsure is not None:
+            volumes = replace(volumes, unsure_m=unsure[first:last].transpose(0, 3, 2, 1))
+        found.append((total.transpose(0, 3, 2, 1), volumes))
         first = last
     return found
 
 
 @compiled(
-    "given f4[:, ::1]",
-    "given f4[:, ::1]",
-    "given f4[:, ::1]",
-    "given f4[:, ::1]",
+    "given f4[:, :, :, ::1]",
+    "given f4[:, :, :, ::1]",
+    "given f4[:, :, :, ::1]",
+    "given f4[:, :, :, ::1]",
     "given b1[::1]",
     "given f4[::1]",
 )
 def _width_products(
     off_m: Array32, sd_m: Array32, peak: Array32, missed: Array32, upper: npt.NDArray[np.bool_], bias_m: Array32
 ) -> Array32:
-    """Return the product (nb, m) over n layers of peak * `width_kernel` + missed, at m poses.
+    """Return the product (nb, nz, nd, 72) over n layers of peak * `width_kernel` + missed.
 
     Args:
-        off_m, sd_m: (n, m) measured minus predicted widths without a bias, and their scales.
-        peak, missed: (n, m) density of a width without error and of an outlier, over that of the background.
+        off_m, sd_m: (n, nz, nd, 72) measured minus predicted widths without a bias, and their scales.
+        peak, missed: (n, nz, nd, 72) density of a width without error and of an outlier, over that of the background.
         upper: (n,) True if the width is only an upper bound.
         bias_m: (nb,) biases.
     """
-    n, m = off_m.shape
-    out = np.ones((len(bias_m), m), dtype=np.float32)
+    product = np.ones((len(bias_m), *off_m.shape[1:]), dtype=np.float32)
     one, third, zero = np.float32(1), np.float32(1 / 3), np.float32(0)
-    for k in range(n):
-        off, sd, top, rest, bound = off_m[k], sd_m[k], peak[k], missed[k], upper[k]
+    for k in range(len(off_m)):
+        off, sd, top, rest = off_m[k].ravel(), sd_m[k].ravel(), peak[k].ravel(), missed[k].ravel()
         for b in range(len(bias_m)):
-            bias, product = bias_m[b], out[b]
-            for i in range(m):
+            bias, bound, out = bias_m[b], upper[k], product[b].ravel()
+            for i in range(len(off)):
                 x = off[i] - bias
                 x = zero if bound and x > zero else x
                 z = x / sd[i]
                 near = one + z * z * third
-                product[i] *= top[i] / (near * near) + rest[i]
-    return out
+                out[i] *= top[i] / (near * near) + rest[i]
+    return product
 
 
 def twin_ratios(volumes: WidthVolumes, seen: Sequence[Observed], p: LikelihoodParams) -> Array32:
@@ -160,14 +160,10 @@ def twin_ratios(volumes: WidthVolumes, seen: Sequence[Observed], p: LikelihoodPa
 
     The twin differs from the target at each closure independently with probability `twin_width`.
     """
-    off, sd, known, unsure = (
-        None if x is None else x.transpose(0, 3, 2, 1)
-        for x in (volumes.off_m, volumes.scale_m, volumes.known, volumes.unsure_m)
-    )
-    assert off is not None and sd is not None and known is not None
+    off, sd, known = (x.transpose(0, 3, 2, 1) for x in (volumes.off_m, volumes.scale_m, volumes.known))
     far_sd = np.full((len(seen), 1, 1, 1), p.twin_width_sd_m, dtype=np.float32)
-    if unsure is not None:
-        far_sd = np.hypot(far_sd, unsure)
+    if volumes.unsure_m is not None:
+        far_sd = np.hypot(far_sd, volumes.unsure_m.transpose(0, 3, 2, 1))
     off = np.where(_by_layer([o.layer.upper_only for o in seen]), np.minimum(off, np.float32(0)), off)
     near = width_kernel(off / sd) * _peak(seen, sd, p)
     far = width_kernel(off / far_sd) * _peak(seen, far_sd, p)
@@ -175,7 +171,7 @@ def twin_ratios(volumes: WidthVolumes, seen: Sequence[Observed], p: LikelihoodPa
     return np.asarray(np.log(mixed).sum(axis=0, keepdims=True).transpose(0, 3, 2, 1))
 
 
-def _by_layer(values: Sequence[float]) -> Floats:
+def _by_layer(values: Sequence[float] | Array) -> Floats:
     """Return values (n,) of layers as (n, 1, 1, 1)."""
     return np.array(values)[:, None, None, None]
 
@@ -185,9 +181,12 @@ def _peak(seen: Sequence[Observed], sd_m: Array32, p: LikelihoodParams) -> Array
 
     If the other finger touched outside its gel, the width is only an upper bound, and uniform above the object's own.
     """
-    scale = (1 - p.width_outlier) * np.exp([-o.log_width for o in seen])[:, None, None, None]
-    bound = (scale / p.width_range_m).astype(np.float32)
-    return np.where(_by_layer([o.layer.upper_only for o in seen]), bound, (scale * T_PEAK).astype(np.float32) / sd_m)
+    scale = (1 - p.width_outlier) * np.exp([-o.log_width for o in seen])
+    peak = _by_layer(scale * T_PEAK).astype(np.float32) / sd_m
+    for k, o in enumerate(seen):
+        if o.layer.upper_only:
+            peak[k] = scale[k] / p.width_range_m
+    return peak
 
 
 def _missed(known: Floats, p: LikelihoodParams) -> Floats:
@@ -202,7 +201,7 @@ def image_ratios(
 ) -> list[Array32]:  # fmt: skip
     """Return each sequence's log ratios (72, nd, nz) of image densities, pose : background, summed over its images.
 
-    Images near the same cells of the table are compared with these cells at once.
+    Images at heights between the same cells of the table are compared with these cells at once.
     """
     yaws = len(model.phi_rad)
     totals = [np.zeros((len(grid.z0_m), len(grid.shift_m), yaws), dtype=np.float32) for _ in sequences]
@@ -219,8 +218,8 @@ def image_ratios(
     z_m = np.array([v.seen.layer.height_m + grid.z0_m for v in views])
     (i, f), (j, g) = _positions(model.l_m, l_m), _positions(model.z_m, z_m)
     by_cells: dict[tuple[int, ...], list[int]] = {}
-    for k, (start, heights) in enumerate(zip(i.min(axis=1).tolist(), j.tolist(), strict=True)):
-        by_cells.setdefault((start // len(grid.shift_m), *heights), []).append(k)
+    for k, cells in enumerate(j.tolist()):
+        by_cells.setdefault(tuple(cells), []).append(k)
     for some in by_cells.values():
         features, rolls = np.array([views[k].feature for k in some]), np.array([views[k].roll for k in some])
         squared = _squared_distances(model, features, (i[some], f[some]), (j[some], g[some]), rolls)
@@ -282,7 +281,7 @@ def _squared_distances(
     a, b = int(i.min()), int(i.max()) + 2
     c, d = int(j.min()), int(j.max()) + 2
     size = features.shape[1]
-    dots = np.empty((len(features), d - c, (b - a) * len(model.phi_rad)), dtype=np.float32)
+    dots = np.zeros((len(features), d - c, (b - a) * len(model.phi_rad)), dtype=np.float32)
     table = model.images_by_height[c:d, a:b].reshape(d - c, -1, size).transpose(0, 2, 1)
     np.matmul(features * np.float32(-2 / size), table, out=dots.transpose(1, 0, 2))
     dots += model.image_norms[c:d, a:b].reshape(d - c, -1) * np.float32(1 / size)
@@ -303,12 +302,11 @@ def _interpolated_widths(model: TargetModel, l_m: Array, z_m: Array, turn_rad: A
         turn_rad: (n,) turns.
     """
     roll = turn_rad / (2 * np.pi) * len(model.phi_rad)
-    whole = np.floor(roll + 1e-6)
-    part = roll - whole
-    part = np.where(part < 1e-3, 0, part).astype(np.float32)
-    whole = whole.astype(np.int64) % len(model.phi_rad)
-    table = model.width_m.transpose(2, 1, 0)[None]
-    out = _interpolated(table, *_positions(model.l_m, l_m), *_positions(model.z_m, z_m), whole, part)
+    whole = np.floor(roll + 1e-6).astype(np.int64)
+    part = (roll - whole).astype(np.float32)
+    part[part < 1e-3] = 0
+    (i, f), (j, g) = _positions(model.l_m, l_m), _positions(model.z_m, z_m)
+    out = _interpolated(model.width_m.transpose(2, 1, 0)[None], i, f, j, g, whole % len(model.phi_rad), part)
     out.transpose(0, 2, 1, 3)[(l_m < model.l_m[0]) | (l_m > model.l_m[-1])] = np.nan
     out[(z_m < model.z_m[0] - 5e-3) | (z_m > model.z_m[-1])] = np.nan
     return out
@@ -333,8 +331,8 @@ def _interpolated(tables: Array32, i: Index, f: Array32, j: Index, g: Array32, r
         rolls, parts: (n,) steps by which the yaws are larger, whole ones from 0 to 71 and a fraction of one.
     """
     n, nz, nl, yaws = len(i), j.shape[1], i.shape[1], tables.shape[3]
-    out = np.empty((n, nz, nl, yaws), dtype=np.float32)
-    twice = np.empty(2 * yaws, dtype=np.float32)
+    out = np.zeros((n, nz, nl, yaws), dtype=np.float32)
+    twice: Array32 = np.zeros(2 * yaws, dtype=np.float32)
     one = np.float32(1)
     for k in range(n):
         table, roll, part = tables[k % len(tables)], rolls[k], parts[k]
@@ -365,7 +363,8 @@ def nearest(table: Array32, model: TargetModel, l_m: Array, z_m: Array, turn_rad
     (i, f), (j, g) = _positions(model.l_m, l_m), _positions(model.z_m, z_m)
     turn = np.rint(turn_rad / (2 * np.pi) * yaws).astype(np.int64) % yaws
     still = np.zeros(len(l_m), dtype=np.float32)
-    return _interpolated(table.transpose(2, 1, 0)[None], i, np.rint(f), j, np.rint(g), turn, still)
+    by_place = np.ascontiguousarray(table.transpose(2, 1, 0))[None]
+    return _interpolated(by_place, i, np.rint(f), j, np.rint(g), turn, still)
 
 
 def _positions(axis: Array, x: Array) -> tuple[Index, Array32]:
@@ -407,7 +406,7 @@ def slide_matrix(grid: Grid, p: LikelihoodParams) -> Array32:
 def marginalised(volume: Array32, shift: Array32, turn: Array32) -> Array32:
     """Marginalise log ratios (nb, 72, nd, nz) over a sequence's own shift and turn; return (nb, 72, n, nz).
 
-    Every weight in `turn` is positive, and one of each column or row of `shift`, so no sum is below the range of 32 bit.
+    All probabilities have a uniform part, so that no sum is below the range of 32 bit.
 
     Args:
         volume: Log ratios.
