@@ -199,96 +199,82 @@ def image_ratios(
     model: TargetModel, sequences: Sequence[Sequence[Observed]], turns_rad: Sequence[float], grid: Grid,
     p: LikelihoodParams,
 ) -> list[Array32]:  # fmt: skip
-    """Return each sequence's log ratios (72, nd, nz) of image densities, pose : background, summed over its images.
-
-    Images at heights between the same cells of the table are compared with these cells at once.
-    """
+    """Return each sequence's log ratios (72, nd, nz) of image densities, pose : background, summed over its images."""
     yaws = len(model.phi_rad)
-    totals = [np.zeros((len(grid.z0_m), len(grid.shift_m), yaws), dtype=np.float32) for _ in sequences]
+    totals = np.zeros((len(sequences), len(grid.z0_m), len(grid.shift_m), yaws), dtype=np.float32)
     views = [
-        _View.of(o, side, round(turn_rad / (2 * np.pi) * yaws), yaws, total)
-        for total, seen, turn_rad in zip(totals, sequences, turns_rad, strict=True)
-        for o in seen
-        for side in (0, 1)
+        (k, side, o) for k, seen in enumerate(sequences) for o in seen for side in (0, 1)
         if o.layer.images[side] is not None
-    ]
-    if not views:
-        return [total.transpose(2, 1, 0) for total in totals]
-    l_m = np.array([v.sign * (v.seen.layer.along_m + grid.shift_m) for v in views])
-    z_m = np.array([v.seen.layer.height_m + grid.z0_m for v in views])
-    (i, f), (j, g) = _positions(model.l_m, l_m), _positions(model.z_m, z_m)
-    by_cells: dict[tuple[int, ...], list[int]] = {}
-    for k, cells in enumerate(j.tolist()):
-        by_cells.setdefault(tuple(cells), []).append(k)
-    for some in by_cells.values():
-        features, rolls = np.array([views[k].feature for k in some]), np.array([views[k].roll for k in some])
-        squared = _squared_distances(model, features, (i[some], f[some]), (j[some], g[some]), rolls)
+    ]  # fmt: skip
+    if views:
+        of, sides = np.array([k for k, *_ in views]), np.array([side for _, side, _ in views])
+        right = sides == 1  # as the left pad would have felt it: from the opposite side, with its columns reversed
+        features = np.array([o.layer.images[side] for _, side, o in views], dtype=np.float32)
+        features[right] = features[right].reshape(-1, *POOLED)[:, :, ::-1].reshape(-1, features.shape[1])
+        l_m = np.array([o.layer.along_m for *_, o in views])[:, None] + grid.shift_m
+        l_m[right] *= -1
+        z_m = np.array([o.layer.height_m for *_, o in views])[:, None] + grid.z0_m
+        rolls = (np.rint(np.array(turns_rad)[of] / (2 * np.pi) * yaws).astype(np.int64) + right * (yaws // 2)) % yaws
+        squared = _squared_distances(model, features, l_m, z_m, rolls)
         # (kernel / background) (1 - outlier) + outlier
-        good = _by_layer([(1 - p.image_outlier) * math.exp(-views[k].log_image) for k in some]).astype(np.float32)
+        log_generic = np.array([o.log_images[side] for _, side, o in views])
+        good = _by_layer((1 - p.image_outlier) * np.exp(-log_generic)).astype(np.float32)
         missed: Floats = np.asarray(p.image_outlier, dtype=np.float32)
         if model.certainty is not None:
-            known = nearest(model.certainty.image_known, model, l_m[some], z_m[some], rolls * (2 * np.pi / yaws))
+            known = nearest(model.certainty.image_known, model, l_m, z_m, rolls * (2 * np.pi / yaws))
             good, missed = good * known, missed + (1 - known) * (1 - missed)
-        for k, ratio in zip(some, np.log(image_kernel(squared, p) * good + missed), strict=True):
-            views[k].total[:] += ratio
-    return [total.transpose(2, 1, 0) for total in totals]
+        for k, ratio in zip(of.tolist(), np.log(image_kernel(squared, p) * good + missed), strict=True):
+            totals[k] += ratio
+    return list(totals.transpose(0, 3, 2, 1))
 
 
-@dataclass(frozen=True, eq=False)
-class _View:
-    """One pad's image, as the left pad would have felt it.
-
-    Attributes:
-        seen: Its layer.
-        feature: (35,) feature.
-        sign: 1 for the left pad, -1 for the right, of which x_P is reversed.
-        roll: Its yaw from the first sequence's hand, in table steps.
-        log_image: Background log density.
-        total: (nz, nd, 72) sum of its sequence.
-    """
-
-    seen: Observed
-    feature: Array32
-    sign: int
-    roll: int
-    log_image: float
-    total: Array32
-
-    @classmethod
-    def of(cls, o: Observed, side: int, turn: int, yaws: int, total: Array32) -> _View:
-        """Return the view of a pad: the right one views the opposite side, and its columns are reversed."""
-        image = o.layer.images[side]
-        assert image is not None
-        feature = image.astype(np.float32)
-        if side == 0:
-            return cls(o, feature, 1, turn % yaws, o.log_images[0], total)
-        feature = feature.reshape(POOLED)[:, ::-1].reshape(-1)
-        return cls(o, feature, -1, (turn + yaws // 2) % yaws, o.log_images[1], total)
-
-
-def _squared_distances(
-    model: TargetModel, features: Array32, along: tuple[Index, Array32], above: tuple[Index, Array32], rolls: Index
-) -> Array32:
-    """Return mean squared distances (n, nz, nd, 72) of each feature to the table, interpolated between cells.
+def _squared_distances(model: TargetModel, features: Array32, l_m: Array, z_m: Array, rolls: Index) -> Array32:
+    """Return mean squared distances (n, nz, nd, 72) of features (n, 35) to the table, interpolated between cells.
 
     Args:
         model: The target.
-        features: (n, 35) features.
-        along, above: Lower cells and fractions (n, nd) of shifts, and (n, nz) of heights.
+        features: Features of n images.
+        l_m, z_m: (n, nd) and (n, nz) places of each image.
         rolls: (n,) steps by which the yaws are larger.
     """
-    (i, f), (j, g) = along, above
-    a, b = int(i.min()), int(i.max()) + 2
-    c, d = int(j.min()), int(j.max()) + 2
-    size = features.shape[1]
-    dots = np.zeros((len(features), d - c, (b - a) * len(model.phi_rad)), dtype=np.float32)
-    table = model.images_by_height[c:d, a:b].reshape(d - c, -1, size).transpose(0, 2, 1)
-    np.matmul(features * np.float32(-2 / size), table, out=dots.transpose(1, 0, 2))
-    dots += model.image_norms[c:d, a:b].reshape(d - c, -1) * np.float32(1 / size)
+    (i, f), (j, g) = _positions(model.l_m, l_m), _positions(model.z_m, z_m)
+    (first_i, cells_i), (first_j, cells_j) = _window(i, len(model.l_m)), _window(j, len(model.z_m))
+    cells = _cell_distances(model.images_by_place, features, first_i, first_j, cells_i, cells_j)
     still = np.zeros(len(features), dtype=np.float32)
-    squared = _interpolated(dots.reshape(*dots.shape[:2], b - a, -1), i - a, f, j - c, g, rolls, still)
-    squared += (features**2).mean(axis=1)[:, None, None, None]
-    return np.maximum(squared, np.float32(0), out=squared)
+    return _interpolated(cells, i - first_i[:, None], f, j - first_j[:, None], g, rolls, still)
+
+
+def _window(lower: Index, count: int) -> tuple[Index, int]:
+    """Return the first cell (n,) of windows of equal size of an axis that hold cells `lower` (n, m) and the next."""
+    size = int(np.ptp(lower, axis=1).max()) + 2
+    return np.minimum(lower.min(axis=1), count - size), size
+
+
+@compiled("given f4[:, :, :, ::1]", "given f4[:, ::1]", "given i8[::1]", "given i8[::1]", "i8", "i8")
+def _cell_distances(
+    table: Array32, features: Array32, first_i: Index, first_j: Index, cells_i: int, cells_j: int
+) -> Array32:
+    """Return mean squared distances (n, cells_j, cells_i, 72) of features (n, 35) to windows of a table.
+
+    Args:
+        table: (nz, nl, 35, 72) features.
+        features: Features of n images.
+        first_i, first_j: (n,) first shift and first height of each window.
+        cells_i, cells_j: Size of all windows.
+    """
+    n, size, yaws = len(features), features.shape[1], table.shape[3]
+    out = np.zeros((n, cells_j, cells_i, yaws), dtype=np.float32)
+    for k in range(n):
+        for z in range(cells_j):
+            for x in range(cells_i):
+                place, total = table[first_j[k] + z, first_i[k] + x], out[k, z, x]
+                for m in range(size):
+                    row, felt = place[m], features[k, m]
+                    for y in range(yaws):
+                        off = row[y] - felt
+                        total[y] += off * off
+    out *= np.float32(1 / size)
+    return out
 
 
 def _interpolated_widths(model: TargetModel, l_m: Array, z_m: Array, turn_rad: Array) -> Array32:
