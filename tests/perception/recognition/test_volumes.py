@@ -26,7 +26,7 @@ def test_marginals_are_sums_over_each_shift_and_turn() -> None:
 def test_a_turn_is_a_normal_or_anything() -> None:
     slip, sd = 0.02, 0.2
     turn = turn_matrix(72, sd, slip)
-    np.testing.assert_allclose(turn.sum(axis=0), 1.0, rtol=1e-6)
+    np.testing.assert_allclose(turn.sum(axis=0, dtype=np.float64), 1.0, rtol=1e-6)
     assert np.isclose(turn[0, 36], slip / 72)
     step = 2 * np.pi / 72
     expected = np.exp(-0.5 * (2 * step / sd) ** 2)
