@@ -173,7 +173,7 @@ def _is_of(model: TargetModel, mesh: Mesh, pad: PadSpec) -> bool:
         return False
     largest_m = axes.radius_m + ROUNDING_M
     tables = all(np.abs(t[np.isfinite(t)]).max(initial=0.0) <= largest_m for t in (reach, fine))
-    images = np.isfinite(model.images_by_height).all() and np.isfinite(model.image_norms).all()
+    images = np.isfinite(model.images_by_place).all()
     return bool(tables and images and _is_within(model, 4.0 * largest_m + TIP_RADIUS_M))
 
 

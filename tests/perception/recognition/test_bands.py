@@ -62,10 +62,10 @@ def test_a_closure_on_a_step_says_nothing() -> None:
     off = np.zeros((72, 7, 3), dtype=np.float32)
     off[:, :, 2] = 0.02
     scale = np.full_like(off, 3e-4)
-    volumes = WidthVolumes(off, scale, np.ones_like(off))
-    assert residual(volumes, SEEN, (0, 3, 1)) is None
-    inside = residual(volumes, SEEN, (71, 3, 0))
+    volumes = WidthVolumes(off[None], scale[None], np.ones_like(off)[None])
+    assert residual(volumes, 0, SEEN, (0, 3, 1)) is None
+    inside = residual(volumes, 0, SEEN, (71, 3, 0))
     assert inside is not None
     np.testing.assert_array_equal(inside.off_m, 0.0)
     off[5, 3, 0] = np.nan
-    assert residual(volumes, SEEN, (5, 3, 0)) is None
+    assert residual(volumes, 0, SEEN, (5, 3, 0)) is None

@@ -33,7 +33,6 @@ def fresh(monkeypatch):
 def same(a: TargetModel, b: TargetModel) -> None:
     np.testing.assert_array_equal(a.width_m, b.width_m)
     np.testing.assert_array_equal(a.images, b.images)
-    np.testing.assert_array_equal(a.image_norms, b.image_norms)
     np.testing.assert_array_equal(a.fine_m, b.fine_m)
     np.testing.assert_array_equal(a.outline.as_box.centre_m, b.outline.as_box.centre_m)
     assert (a.height_m, a.rho, a.anisotropy, a.pad, a.digest) == (b.height_m, b.rho, b.anisotropy, b.pad, b.digest)

@@ -43,9 +43,9 @@ class Residual:
     log_width: float = 0.0
 
 
-def residual(volumes: WidthVolumes, seen: Observed, at: tuple[int, int, int]) -> Residual | None:
-    """Return the residual of a closure at the best (yaw, shift, height offset); None if undefined."""
-    off_m = volumes.off_m
+def residual(volumes: WidthVolumes, k: int, seen: Observed, at: tuple[int, int, int]) -> Residual | None:
+    """Return the residual of closure k at the best (yaw, shift, height offset); None if undefined."""
+    off_m = volumes.off_m[k]
     i, d, z = at
     middle = float(off_m[i, d, z])
     if not math.isfinite(middle):
@@ -56,7 +56,7 @@ def residual(volumes: WidthVolumes, seen: Observed, at: tuple[int, int, int]) ->
     if np.ptp(half) > STEP_M:
         return None
     return Residual(
-        half, float(volumes.scale_m[i, d, z]), seen.layer.height_m, float(volumes.known[i, d, z]), seen.log_width
+        half, float(volumes.scale_m[k, i, d, z]), seen.layer.height_m, float(volumes.known[k, i, d, z]), seen.log_width
     )
 
 

@@ -218,10 +218,9 @@ def _at(q: Prediction, closures: Sequence[Closure]) -> tuple[Array, tuple[Array3
     along = ((place - q.candidate.contour.centre_K_m) * x_K).sum(axis=1)[:, None] + x @ centre
     j = _nearest(model.l_m, along)
     k = _nearest(model.z_m, height[:, None] + q.z0_m[None, :])
-    table = model.images_by_height
-    left = table[k, j, i]
+    left = model.images[i, j, k]
     j_right, i_right = _nearest(model.l_m, -along), (i + n // 2) % n
-    right = table[k, j_right, i_right]
+    right = model.images[i_right, j_right, k]
     right = np.ascontiguousarray(right.reshape(*i.shape, *POOLED)[..., ::-1]).reshape(left.shape)
     novelty = np.ones(len(closures))
     if len(q.felt):

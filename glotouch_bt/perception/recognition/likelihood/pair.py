@@ -28,9 +28,9 @@ from glotouch_bt.perception.recognition.likelihood.volumes import (
     WidthVolumes,
     image_ratios,
     log_sum,
-    marginalise_slide,
-    marginalise_turn,
+    marginalised,
     slide_matrix,
+    turn_matrix,
     twin_ratios,
     width_ratios,
 )
@@ -150,17 +150,29 @@ class _SearchedSequence:
     Attributes:
         seen: Its layers.
         turn_rad: Yaw of its hand from that of the first sequence.
-        turn_sd_rad: Standard deviation of the object's turn since the first closure.
+        shift: Probability of each shift: (nd, nd), given the common one of parallel tracks; else (nd, 72), by yaw.
+        turn: Probability of each turn, `turn_matrix`.
         widths, images: (nb, 72, nd, nz) and (72, nd, nz) log ratios.
-        layers: The width of each layer.
+        volumes: The widths of its layers.
     """
 
     seen: tuple[Observed, ...]
     turn_rad: float
-    turn_sd_rad: float
+    shift: Array32
+    turn: Array32
     widths: Array32
     images: Array32
-    layers: list[WidthVolumes]
+    volumes: WidthVolumes
+
+    def marginal(self, widths: Array32) -> Array32:
+        """Return the log ratio, marginalised over its own shift and turn, with given log ratios of widths."""
+        return marginalised(widths + self.images[None], self.shift, self.turn)
+
+    def best_shift(self, at: tuple[int, int, int, int]) -> int:
+        """Return the index of the likeliest shift at (bias, yaw, common shift, height offset)."""
+        b, i, c, z = at
+        prior = self.shift[:, c if self.shift.shape[1] == len(self.shift) else i]
+        return int(np.argmax(self.widths[b, i, :, z] + self.images[i, :, z] + np.log(prior)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +186,6 @@ class _Search:
         grid: Grid of the nuisances.
         common: Log prior of yaw, shift and height offset.
         log_bias: (nb,) log prior of the bias.
-        slide: See `_best_shift`.
         parts: The sequences.
         joint: (nb, 72, nd or 1, nz) log ratio before the last marginalisation.
         total: Log ratio of widths and images.
@@ -187,7 +198,6 @@ class _Search:
     grid: Grid
     common: Array
     log_bias: Array
-    slide: Array32 | None
     parts: tuple[_SearchedSequence, ...]
     joint: Array32
     total: float
@@ -206,7 +216,7 @@ class _Search:
             ratio = p.outline_offset + p.slope * sum(terms.values())
             none = np.zeros((1, 1, 1, 1))
             return cls(
-                hypothesis, reading, terms, grid, none, log_bias, None, (), none.astype(np.float32), 0.0, ratio
+                hypothesis, reading, terms, grid, none, log_bias, (), none.astype(np.float32), 0.0, ratio
             )  # fmt: skip
         first = reading.sequences[0][0].layer.yaw_rad
         turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
@@ -214,47 +224,30 @@ class _Search:
         common = yaw_prior(model, touchset.candidate, first, p)[None, :, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
         if parallel:  # parallel tracks share one shift along x_P; each may slide
             common = common + shift_prior(model, touchset.candidate, 0.0, grid.shift_m, p)[None, :, :, None]
+        slide = slide_matrix(grid, p)
         moved = observed_turns(touchset)
         parts = []
         images = image_ratios(model, reading.sequences, turns.tolist(), grid, p)
-        for seen, turn, image in zip(reading.sequences, turns.tolist(), images, strict=True):
+        felt = width_ratios(model, reading.sequences, turns.tolist(), grid, p)
+        for seen, turn, image, (widths, volumes) in zip(reading.sequences, turns.tolist(), images, felt, strict=True):
+            if parallel:  # the hand may point the other way
+                shift = slide if np.cos(turn) >= 0 else slide[::-1]
+            else:
+                shift = np.exp(shift_prior(model, touchset.candidate, turn, grid.shift_m, p).T).astype(np.float32)
             sd = math.hypot(p.turn_sd_rad, moved[seen[0].layer.sequence])
-            widths, layers = width_ratios(model, seen, turn, grid, p)
             tempered = np.float32(p.temper_width) * widths, np.float32(p.temper_image) * image
-            parts.append(_SearchedSequence(seen, turn, sd, *tempered, layers))
-        found = cls(
-            hypothesis, reading, terms, grid, common, log_bias, slide_matrix(grid, p) if parallel else None,
-            tuple(parts), (common + log_bias[:, None, None, None]).astype(np.float32), 0.0, 0.0,
-        )  # fmt: skip
-        joint = found.joint
+            moves = shift, turn_matrix(len(model.phi_rad), sd, p.slip)
+            parts.append(_SearchedSequence(seen, turn, *moves, *tempered, volumes))
+        joint = (common + log_bias[:, None, None, None]).astype(np.float32)
         for part in parts:
-            joint = joint + found.marginal(part, part.widths, p)
+            joint = joint + part.marginal(part.widths)
         total = float(log_sum(joint.reshape(1, -1), 1)[0])
-        return replace(found, joint=joint, total=total)._with_relief(p)
+        found = cls(hypothesis, reading, terms, grid, common, log_bias, tuple(parts), joint, total, 0.0)
+        return found._with_relief(p)
 
-    def volume(self, part: _SearchedSequence, widths: Array32, p: LikelihoodParams) -> Array32:
-        """Return the log ratio (nb, 72, nd, nz) of a sequence with given log ratios of widths."""
-        volume = widths + part.images[None]
-        if self.slide is not None:
-            return volume[:, :, ::-1] if self.flips(part) else volume
-        candidate = self.reading.touchset.candidate
-        prior = shift_prior(self.hypothesis.model, candidate, part.turn_rad, self.grid.shift_m, p)
-        return np.asarray(volume + prior[None, :, :, None].astype(np.float32))
-
-    def marginal(self, part: _SearchedSequence, widths: Array32, p: LikelihoodParams) -> Array32:
-        """Return `volume`, marginalised over the sequence's own shift and turn."""
-        volume = self.volume(part, widths, p)
-        if self.slide is not None:
-            return marginalise_turn(marginalise_slide(volume, self.slide), p, part.turn_sd_rad)
-        return marginalise_turn(log_sum(volume, 2), p, part.turn_sd_rad)[:, :, None]
-
-    def flips(self, part: _SearchedSequence) -> bool:
-        """Return True if the hand of a parallel track points the other way."""
-        return bool(np.cos(part.turn_rad) < 0)
-
-    def shift_indices(self, at: tuple[int, int, int, int], p: LikelihoodParams) -> list[int]:
+    def shift_indices(self, at: tuple[int, int, int, int]) -> list[int]:
         """Return the index of each sequence's likeliest shift at (bias, yaw, common shift, height offset)."""
-        return [_best_shift(self.volume(part, part.widths, p), self.slide, self.flips(part), at) for part in self.parts]
+        return [part.best_shift(at) for part in self.parts]
 
     def shifts_m(self, indices: Sequence[int]) -> Array:
         """Return the shifts of all sequences of the TouchSet; 0 for those without evidence."""
@@ -270,7 +263,7 @@ class _Search:
         model = self.hypothesis.model
         poses = _likely_poses(
             model, self.joint, log_sum(self.joint, (0, 2)), self.grid,
-            lambda at: self.shifts_m(self.shift_indices(at, p)), p.relief_poses,
+            lambda at: self.shifts_m(self.shift_indices(at)), p.relief_poses,
         )  # fmt: skip
         layers = [(o.layer, part.turn_rad, o.log_reliefs) for part in self.parts for o in part.seen]
         relief = relief_ratio(model, layers, poses, p)
@@ -284,7 +277,7 @@ class _Search:
             pose = contour_pose(touchset)
             return Pair(index, log_ratio, 0.0, self.terms, None, 0.0, 0.0, None, pose, 0.0, self.hypothesis)
         b, i, c, z = (int(k) for k in np.unravel_index(int(np.argmax(self.joint)), self.joint.shape))
-        at = self.shift_indices((b, i, c, z), p)
+        at = self.shift_indices((b, i, c, z))
         width = sum(float(part.widths[b, i, d, z]) for part, d in zip(self.parts, at, strict=True))
         image = sum(float(part.images[i, d, z]) for part, d in zip(self.parts, at, strict=True))
         terms = {k: v for k, v in self.terms.items() if k != "relief"}
@@ -305,24 +298,13 @@ class _Search:
         twin = self.common.astype(np.float32)
         felt: list[Residual] = []
         for part, d in zip(self.parts, shifts, strict=True):
-            widths = np.float32(p.temper_width) * twin_ratios(part.layers, part.seen, p)
-            twin = twin + self.marginal(part, widths, p)
-            sharp = [(o, layer) for o, layer in zip(part.seen, part.layers, strict=True) if not o.layer.upper_only]
-            felt += [r for o, layer in sharp if (r := residual(layer, o, (at[0], d, at[1])))]
+            widths = np.float32(p.temper_width) * twin_ratios(part.volumes, part.seen, p)
+            twin = twin + part.marginal(widths)
+            sharp = [(k, o) for k, o in enumerate(part.seen) if not o.layer.upper_only]
+            felt += [r for k, o in sharp if (r := residual(part.volumes, k, o, (at[0], d, at[1])))]
         by_places = float(log_sum(twin.reshape(1, -1), 1)[0]) - self.total
         by_bands = p.temper_width * log_banded_twin(felt, self.grid.bias_m, self.log_bias, p)
         return p.twin_slope * 0.5 * (by_places + by_bands)
-
-
-def _best_shift(volume: Array32, slide: Array32 | None, flip: bool, at: tuple[int, int, int, int]) -> int:
-    """Return the index of a sequence's likeliest shift at (bias, yaw, common shift, height offset).
-
-    `slide` is the probability of a sequence's shift given the common one of parallel tracks; None if they are not.
-    """
-    b, i, c, z = at
-    along = volume[b, i, :, z] + (0 if slide is None else np.log(slide[:, c]))
-    d = int(np.argmax(along))
-    return volume.shape[2] - 1 - d if slide is not None and flip else d
 
 
 def _has_relief(reading: TouchSetReading) -> bool:

@@ -8,18 +8,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.perception.recognition.evidence import LayerEvidence
 from glotouch_bt.perception.recognition.likelihood.background import image_kernel
+from glotouch_bt.perception.recognition.likelihood.interpolation import (
+    Index,
+    interpolated,
+    interpolated_widths,
+    nearest,
+    positions,
+)
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.model import POOLED, Array32, TargetModel, span
 from glotouch_bt.robot import Array
 
-Index = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.floating]
 T_PEAK = 2 / (math.pi * math.sqrt(3))
 """Density of Student's t with three degrees of freedom at 0."""
@@ -59,7 +67,7 @@ class Observed:
 
 @dataclass(frozen=True)
 class WidthVolumes:
-    """Width of one layer at every pose, each (72, nd, nz).
+    """Widths of the layers of a sequence at every pose, each (n, 72, nd, nz).
 
     Attributes:
         off_m: Measured minus predicted width; -inf where the window is empty.
@@ -68,10 +76,10 @@ class WidthVolumes:
         unsure_m: The part of the scale that is the model's.
     """
 
-    off_m: Floats
-    scale_m: Floats
-    known: Floats
-    unsure_m: Floats | None = None
+    off_m: Array32
+    scale_m: Array32
+    known: Array32
+    unsure_m: Array32 | None = None
 
 
 def width_kernel(z: Floats) -> Floats:
@@ -81,75 +89,110 @@ def width_kernel(z: Floats) -> Floats:
 
 
 def width_ratios(
-    model: TargetModel, seen: Sequence[Observed], turn_rad: float, grid: Grid, p: LikelihoodParams
-) -> tuple[Array32, list[WidthVolumes]]:
-    """Return log ratios (nb, 72, nd, nz) of widths, summed over layers, and each layer's volumes.
+    model: TargetModel, sequences: Sequence[Sequence[Observed]], turns_rad: Sequence[float], grid: Grid,
+    p: LikelihoodParams,
+) -> list[tuple[Array32, WidthVolumes]]:  # fmt: skip
+    """Return each sequence's log ratios (nb, 72, nd, nz) of widths, summed over layers, and its volumes.
 
     A width that the model does not know is as that of any object (`Certainty`).
     """
-    shape = (len(model.phi_rad), len(grid.shift_m), len(grid.z0_m))
-    total = np.zeros((len(grid.bias_m), *shape[::-1]), dtype=np.float32)
-    bias = grid.bias_m.astype(np.float32)[:, None, None, None]
-    volumes: list[WidthVolumes] = []
-    product: Floats = np.ones_like(total)
-    for n, o in enumerate(seen, 1):
-        e = o.layer
-        at, z_m = e.along_m + grid.shift_m, e.height_m + grid.z0_m
-        off = np.float32(e.width_m) - interpolated_width(model, at, z_m, turn_rad)
-        off[np.isnan(off)] = -np.inf
-        sd = np.float32(p.width_rough) * nearest(model.unevenness_m, model, at, z_m, turn_rad)
-        sd = np.sqrt(sd * sd + np.float32(p.width_sd_m**2))
-        known: Floats = np.broadcast_to(np.float32(1), shape)
-        unsure: Floats | None = None
-        if model.certainty is not None:
-            unsure = nearest(model.certainty.width_sd_m, model, at, z_m, turn_rad)
-            sd = np.hypot(sd, unsure)
-            known = nearest(model.certainty.width_known, model, at, z_m, turn_rad)
-        volumes.append(WidthVolumes(off, sd, known, unsure))
-        peak, missed = known * _peak(o, sd, p), _missed(known, p)
-        near = off.transpose(2, 1, 0) - bias  # all in (nb, nz, nd, 72), the order in memory, and in place
-        if e.upper_only:
-            np.minimum(near, np.float32(0), out=near)
-        near /= sd.transpose(2, 1, 0)
-        near *= near
-        near *= np.float32(1 / 3)
-        near += np.float32(1)
-        near *= near
-        np.divide(peak.transpose(2, 1, 0), near, out=near)
-        near += missed.transpose(2, 1, 0)
-        product *= near
-        if n % LAYERS_A_LOG == 0 or n == len(seen):
-            total += np.log(product)
-            product = np.ones_like(total)
-    return total.transpose(0, 3, 2, 1), volumes
+    seen = [o for s in sequences for o in s]
+    turn = np.repeat(turns_rad, [len(s) for s in sequences])
+    l_m = np.array([o.layer.along_m for o in seen])[:, None] + grid.shift_m
+    z_m = np.array([o.layer.height_m for o in seen])[:, None] + grid.z0_m
+    # all in (n, nz, nd, 72), the order in memory
+    off = np.array([o.layer.width_m for o in seen], dtype=np.float32)[:, None, None, None]
+    off = off - interpolated_widths(model, l_m, z_m, turn)
+    off[np.isnan(off)] = -np.inf
+    sd = np.float32(p.width_rough) * nearest(model.unevenness_m, model, l_m, z_m, turn)
+    sd = np.sqrt(sd * sd + np.float32(p.width_sd_m**2))
+    known, unsure = np.ones_like(sd), None
+    if model.certainty is not None:
+        unsure = nearest(model.certainty.width_sd_m, model, l_m, z_m, turn)
+        sd = np.hypot(sd, unsure)
+        known = nearest(model.certainty.width_known, model, l_m, z_m, turn)
+    upper = np.array([o.layer.upper_only for o in seen])
+    peak, missed, bias = known * _peak(seen, sd, p), _missed(known, p), grid.bias_m.astype(np.float32)
+    found, first = [], 0
+    for last in np.cumsum([len(s) for s in sequences]).tolist():
+        total = np.zeros((len(bias), *sd.shape[1:]), dtype=np.float32)
+        for k in range(first, last, LAYERS_A_LOG):
+            some = slice(k, min(k + LAYERS_A_LOG, last))
+            total += np.log(_width_products(off[some], sd[some], peak[some], missed[some], upper[some], bias))
+        volumes = WidthVolumes(*(x[first:last].transpose(0, 3, 2, 1) for x in (off, sd, known)))
+        if unsure is not None:
+            volumes = replace(volumes, unsure_m=unsure[first:last].transpose(0, 3, 2, 1))
+        found.append((total.transpose(0, 3, 2, 1), volumes))
+        first = last
+    return found
 
 
-def twin_ratios(volumes: Sequence[WidthVolumes], seen: Sequence[Observed], p: LikelihoodParams) -> Array32:
+@compiled(
+    "given f4[:, :, :, ::1]",
+    "given f4[:, :, :, ::1]",
+    "given f4[:, :, :, ::1]",
+    "given f4[:, :, :, ::1]",
+    "given b1[::1]",
+    "given f4[::1]",
+)
+def _width_products(
+    off_m: Array32, sd_m: Array32, peak: Array32, missed: Array32, upper: npt.NDArray[np.bool_], bias_m: Array32
+) -> Array32:
+    """Return the product (nb, nz, nd, 72) over n layers of peak * `width_kernel` + missed.
+
+    Args:
+        off_m, sd_m: (n, nz, nd, 72) measured minus predicted widths without a bias, and their scales.
+        peak, missed: (n, nz, nd, 72) density of a width without error and of an outlier, over that of the background.
+        upper: (n,) True if the width is only an upper bound.
+        bias_m: (nb,) biases.
+    """
+    product = np.ones((len(bias_m), *off_m.shape[1:]), dtype=np.float32)
+    one, third, zero = np.float32(1), np.float32(1 / 3), np.float32(0)
+    for k in range(len(off_m)):
+        off, sd, top, rest = off_m[k].ravel(), sd_m[k].ravel(), peak[k].ravel(), missed[k].ravel()
+        for b in range(len(bias_m)):
+            bias, bound, out = bias_m[b], upper[k], product[b].ravel()
+            for i in range(len(off)):
+                x = off[i] - bias
+                x = zero if bound and x > zero else x
+                z = x / sd[i]
+                near = one + z * z * third
+                out[i] *= top[i] / (near * near) + rest[i]
+    return product
+
+
+def twin_ratios(volumes: WidthVolumes, seen: Sequence[Observed], p: LikelihoodParams) -> Array32:
     """Return log ratios (1, 72, nd, nz) of the widths of a twin, summed over layers.
 
     The twin differs from the target at each closure independently with probability `twin_width`.
     """
-    total = np.zeros((1, *volumes[0].off_m.shape), dtype=np.float32)
-    for v, o in zip(volumes, seen, strict=True):
-        far_sd: Floats = np.asarray(p.twin_width_sd_m, dtype=np.float32)
-        if v.unsure_m is not None:
-            far_sd = np.hypot(far_sd, v.unsure_m)
-        off = np.minimum(v.off_m, np.float32(0)) if o.layer.upper_only else v.off_m
-        near = width_kernel(off / v.scale_m) * _peak(o, v.scale_m, p)
-        far = width_kernel(off / far_sd) * _peak(o, far_sd, p)
-        total += np.log(v.known * (near + np.float32(p.twin_width) * (far - near)) + _missed(v.known, p))
-    return total
+    off, sd, known = (x.transpose(0, 3, 2, 1) for x in (volumes.off_m, volumes.scale_m, volumes.known))
+    far_sd = np.full((len(seen), 1, 1, 1), p.twin_width_sd_m, dtype=np.float32)
+    if volumes.unsure_m is not None:
+        far_sd = np.hypot(far_sd, volumes.unsure_m.transpose(0, 3, 2, 1))
+    off = np.where(_by_layer([o.layer.upper_only for o in seen]), np.minimum(off, np.float32(0)), off)
+    near = width_kernel(off / sd) * _peak(seen, sd, p)
+    far = width_kernel(off / far_sd) * _peak(seen, far_sd, p)
+    mixed = known * (near + np.float32(p.twin_width) * (far - near)) + _missed(known, p)
+    return np.asarray(np.log(mixed).sum(axis=0, keepdims=True).transpose(0, 3, 2, 1))
 
 
-def _peak(o: Observed, sd_m: Floats, p: LikelihoodParams) -> Floats:
-    """Return the largest density of a width that is no outlier, over that of the background.
+def _by_layer(values: Sequence[float] | Array) -> Floats:
+    """Return values (n,) of layers as (n, 1, 1, 1)."""
+    return np.array(values)[:, None, None, None]
+
+
+def _peak(seen: Sequence[Observed], sd_m: Array32, p: LikelihoodParams) -> Array32:
+    """Return the largest density (n, ...) of a width that is no outlier, over that of the background.
 
     If the other finger touched outside its gel, the width is only an upper bound, and uniform above the object's own.
     """
-    scale = (1 - p.width_outlier) * math.exp(-o.log_width)
-    if o.layer.upper_only:
-        return np.asarray(scale / p.width_range_m, dtype=np.float32)
-    return np.float32(scale * T_PEAK) / sd_m
+    scale = (1 - p.width_outlier) * np.exp([-o.log_width for o in seen])
+    peak = _by_layer(scale * T_PEAK).astype(np.float32) / sd_m
+    for k, o in enumerate(seen):
+        if o.layer.upper_only:
+            peak[k] = scale[k] / p.width_range_m
+    return peak
 
 
 def _missed(known: Floats, p: LikelihoodParams) -> Floats:
@@ -162,133 +205,82 @@ def image_ratios(
     model: TargetModel, sequences: Sequence[Sequence[Observed]], turns_rad: Sequence[float], grid: Grid,
     p: LikelihoodParams,
 ) -> list[Array32]:  # fmt: skip
-    """Return each sequence's log ratios (72, nd, nz) of image densities, pose : background, summed over its images.
-
-    Images at heights between the same cells of the table are compared with these cells at once.
-    """
+    """Return each sequence's log ratios (72, nd, nz) of image densities, pose : background, summed over its images."""
     yaws = len(model.phi_rad)
-    totals = [np.zeros((len(grid.z0_m), len(grid.shift_m), yaws), dtype=np.float32) for _ in sequences]
-    by_cells: dict[tuple[int, ...], list[_View]] = {}
-    for total, seen, turn_rad in zip(totals, sequences, turns_rad, strict=True):
-        turn = round(turn_rad / (2 * np.pi) * yaws)
-        for o in seen:
-            z_m = o.layer.height_m + grid.z0_m
-            cells = tuple(_positions(model.z_m, z_m)[0].tolist())
-            for side, image in enumerate(o.layer.images):
-                if image is None:
-                    continue
-                feature = image.astype(np.float32)
-                at, roll = o.layer.along_m + grid.shift_m, turn
-                if side == 1:  # the right pad views the opposite side: its columns are reversed
-                    feature = feature.reshape(POOLED)[:, ::-1].reshape(-1)
-                    at, roll = -at, turn + yaws // 2
-                view = _View(feature, at, z_m, roll % yaws, o.log_images[side], total)
-                by_cells.setdefault(cells, []).append(view)
-    for views in by_cells.values():
-        for v, squared in zip(views, _squared_distances(model, views), strict=True):
-            # (kernel / background) (1 - outlier) + outlier
-            good: Floats = np.asarray((1 - p.image_outlier) * math.exp(-v.log_image), dtype=np.float32)
-            missed: Floats = np.asarray(p.image_outlier, dtype=np.float32)
-            if model.certainty is not None:
-                known = nearest(model.certainty.image_known, model, v.l_m, v.z_m, 0.0).transpose(2, 1, 0)
-                good, missed = good * known, missed + (1 - known) * (1 - missed)
-            ratio = np.log(image_kernel(squared, p) * good + missed)
-            v.total[:, :, : yaws - v.roll] += ratio[:, :, v.roll :]
-            v.total[:, :, yaws - v.roll :] += ratio[:, :, : v.roll]
-    return [total.transpose(2, 1, 0) for total in totals]
+    totals = np.zeros((len(sequences), len(grid.z0_m), len(grid.shift_m), yaws), dtype=np.float32)
+    views = [
+        (k, side, o) for k, seen in enumerate(sequences) for o in seen for side in (0, 1)
+        if o.layer.images[side] is not None
+    ]  # fmt: skip
+    if views:
+        of, sides = np.array([k for k, *_ in views]), np.array([side for _, side, _ in views])
+        right = sides == 1  # as the left pad would have felt it: from the opposite side, with its columns reversed
+        features = np.array([o.layer.images[side] for _, side, o in views], dtype=np.float32)
+        features[right] = features[right].reshape(-1, *POOLED)[:, :, ::-1].reshape(-1, features.shape[1])
+        l_m = np.array([o.layer.along_m for *_, o in views])[:, None] + grid.shift_m
+        l_m[right] *= -1
+        z_m = np.array([o.layer.height_m for *_, o in views])[:, None] + grid.z0_m
+        rolls = (np.rint(np.array(turns_rad)[of] / (2 * np.pi) * yaws).astype(np.int64) + right * (yaws // 2)) % yaws
+        squared = _squared_distances(model, features, l_m, z_m, rolls)
+        # (kernel / background) (1 - outlier) + outlier
+        log_generic = np.array([o.log_images[side] for _, side, o in views])
+        good = _by_layer((1 - p.image_outlier) * np.exp(-log_generic)).astype(np.float32)
+        missed: Floats = np.asarray(p.image_outlier, dtype=np.float32)
+        if model.certainty is not None:
+            known = nearest(model.certainty.image_known, model, l_m, z_m, rolls * (2 * np.pi / yaws))
+            good, missed = good * known, missed + (1 - known) * (1 - missed)
+        for k, ratio in zip(of.tolist(), np.log(image_kernel(squared, p) * good + missed), strict=True):
+            totals[k] += ratio
+    return list(totals.transpose(0, 3, 2, 1))
 
 
-@dataclass(frozen=True, eq=False)
-class _View:
-    """One pad's image, as the left pad would have felt it.
+def _squared_distances(model: TargetModel, features: Array32, l_m: Array, z_m: Array, rolls: Index) -> Array32:
+    """Return mean squared distances (n, nz, nd, 72) of features (n, 35) to the table, interpolated between cells.
 
-    Attributes:
-        feature: (35,) feature.
-        l_m, z_m: (nd,) and (nz,) places of the pad's middle.
-        roll: Its yaw from the first sequence's hand, in table steps.
-        log_image: Background log density.
-        total: (nz, nd, 72) sum of its sequence.
+    Args:
+        model: The target.
+        features: Features of n images.
+        l_m, z_m: (n, nd) and (n, nz) places of each image.
+        rolls: (n,) steps by which the yaws are larger.
     """
-
-    feature: Array32
-    l_m: Array
-    z_m: Array
-    roll: int
-    log_image: float
-    total: Array32
+    (i, f), (j, g) = positions(model.l_m, l_m), positions(model.z_m, z_m)
+    (first_i, cells_i), (first_j, cells_j) = _window(i, len(model.l_m)), _window(j, len(model.z_m))
+    cells = _cell_distances(model.images_by_place, features, first_i, first_j, cells_i, cells_j)
+    still = np.zeros(len(features), dtype=np.float32)
+    return interpolated(cells, i - first_i[:, None], f, j - first_j[:, None], g, rolls, still)
 
 
-def _squared_distances(model: TargetModel, views: Sequence[_View]) -> list[Array32]:
-    """Return mean squared distances (nz, nd, 72) of each feature to the table, interpolated between cells.
+def _window(lower: Index, count: int) -> tuple[Index, int]:
+    """Return the first cell (n,) of windows of equal size of an axis that hold cells `lower` (n, m) and the next."""
+    size = int(np.ptp(lower, axis=1).max()) + 2
+    return np.minimum(lower.min(axis=1), count - size), size
 
-    All views lie between the same heights of the table.
+
+@compiled("given f4[:, :, :, ::1]", "given f4[:, ::1]", "given i8[::1]", "given i8[::1]", "i8", "i8")
+def _cell_distances(
+    table: Array32, features: Array32, first_i: Index, first_j: Index, cells_i: int, cells_j: int
+) -> Array32:
+    """Return mean squared distances (n, cells_j, cells_i, 72) of features (n, 35) to windows of a table.
+
+    Args:
+        table: (nz, nl, 35, 72) features.
+        features: Features of n images.
+        first_i, first_j: (n,) first shift and first height of each window.
+        cells_i, cells_j: Size of all windows.
     """
-    i, f = _positions(model.l_m, np.array([v.l_m for v in views]))
-    j, g = _positions(model.z_m, np.array([v.z_m for v in views]))
-    features = np.array([v.feature for v in views])
-    a, b = int(i.min()), int(i.max()) + 2
-    c, d = int(j.min()), int(j.max()) + 2
-    table = model.images_by_height[c:d, a:b]
-    norms = model.image_norms[c:d, a:b].reshape(d - c, 1, -1)
-    squared = features @ table.reshape(d - c, -1, features.shape[1]).transpose(0, 2, 1)  # (heights, n, places)
-    squared *= np.float32(-2)
-    squared += norms
-    squared += (features**2).sum(axis=1)[:, None]
-    np.maximum(squared, np.float32(0), out=squared)
-    squared *= np.float32(1 / features.shape[1])
-    squared = squared.reshape(d - c, len(views), b - a, -1).transpose(1, 0, 2, 3)
-    out = []
-    for k, one in enumerate(squared):
-        along = one[:, i[k] - a]
-        along += f[k][None, :, None] * (one[:, i[k] - a + 1] - along)
-        low = along[j[k] - c]
-        low += g[k][:, None, None] * (along[j[k] - c + 1] - low)
-        out.append(low)
+    n, size, yaws = len(features), features.shape[1], table.shape[3]
+    out = np.zeros((n, cells_j, cells_i, yaws), dtype=np.float32)
+    for k in range(n):
+        for z in range(cells_j):
+            for x in range(cells_i):
+                place, total = table[first_j[k] + z, first_i[k] + x], out[k, z, x]
+                for m in range(size):
+                    row, felt = place[m], features[k, m]
+                    for y in range(yaws):
+                        off = row[y] - felt
+                        total[y] += off * off
+    out *= np.float32(1 / size)
     return out
-
-
-def interpolated_width(model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
-    """Return predicted widths (72, nl, nz) at yaws phi + turn; NaN for empty windows and outside the table."""
-    i, f = _positions(model.l_m, l_m)
-    j, g = _positions(model.z_m, z_m)
-    c, d = int(j.min()), int(j.max()) + 2
-    t = model.width_m.transpose(2, 1, 0)[c:d]  # (heights, shifts, yaws)
-    j, f, g = j - c, f[None, :, None], g[:, None, None]
-    along = t[:, i] * (1 - f) + t[:, i + 1] * f
-    out = along[j] * (1 - g) + along[j + 1] * g
-    out[:, (l_m < model.l_m[0]) | (l_m > model.l_m[-1])] = np.nan
-    out[(z_m < model.z_m[0] - 5e-3) | (z_m > model.z_m[-1])] = np.nan
-    roll = turn_rad / (2 * np.pi) * len(model.phi_rad)
-    whole = math.floor(roll + 1e-6)
-    part = np.float32(max(roll - whole, 0.0))
-    first = _turned(out, whole)
-    if part >= 1e-3:
-        first = (1 - part) * first + part * _turned(first, 1)
-    return np.asarray(first.transpose(2, 1, 0), dtype=np.float32)
-
-
-def nearest(table: Array32, model: TargetModel, l_m: Array, z_m: Array, turn_rad: float) -> Array32:
-    """Return the values (72, nl, nz) of the nearest cells of a table of a model, at yaws phi + turn."""
-    i, j = (
-        np.clip(np.rint((x - axis[0]) / (axis[1] - axis[0])), 0, len(axis) - 1).astype(np.int64)
-        for axis, x in ((model.l_m, l_m), (model.z_m, z_m))
-    )
-    turn = round(turn_rad / (2 * np.pi) * len(model.phi_rad))
-    return _turned(table.transpose(2, 1, 0)[j[:, None], i[None, :]], turn).transpose(2, 1, 0)
-
-
-def _turned(x: Floats, steps: int) -> Array32:
-    """Return an array (..., 72) at yaws that are `steps` larger."""
-    at = steps % x.shape[-1]
-    return np.asarray(np.concatenate([x[..., at:], x[..., :at]], axis=-1) if at else x, dtype=np.float32)
-
-
-def _positions(axis: Array, x: Array) -> tuple[Index, Array32]:
-    """Return lower cell and fraction of each x, clamped to the axis."""
-    last = len(axis) - 1
-    t = np.minimum(np.maximum((x - axis[0]) * (last / (axis[-1] - axis[0])), 0.0), last - 1e-9)
-    i = t.astype(np.int64)  # floor, because t is not negative
-    return i, (t - i).astype(np.float32)
 
 
 def log_sum(x: Array32, axis: int | tuple[int, ...]) -> Array32:
@@ -298,20 +290,17 @@ def log_sum(x: Array32, axis: int | tuple[int, ...]) -> Array32:
     return np.asarray(np.log(np.exp(x - safe).sum(axis=axis)) + np.squeeze(safe, axis=axis), dtype=np.float32)
 
 
-def marginalise_turn(x: Array32, p: LikelihoodParams, sd_rad: float) -> Array32:
-    """Marginalise over the object's turn along axis 1: a normal of `sd_rad`, and a uniform part of weight `slip`."""
-    n = x.shape[1]
-    step = 2 * math.pi / n
-    reach = min(max(1, math.ceil(2 * sd_rad / step)), n // 2)
-    weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / sd_rad) ** 2)
-    weight *= (1 - p.slip) / weight.sum()
-    top = x.max(axis=1, keepdims=True)
-    e = np.exp(x - top)
-    wrapped = np.concatenate([e[:, -reach:], e, e[:, :reach]], axis=1)
-    out = np.float32(p.slip) * e.mean(axis=1, keepdims=True)
-    for k, w in enumerate(weight):
-        out = out + np.float32(w) * wrapped[:, k : k + n]
-    return np.asarray(np.log(out) + top, dtype=np.float32)
+@lru_cache(maxsize=64)
+def turn_matrix(yaws: int, sd_rad: float, slip: float) -> Array32:
+    """Return the probability (72, 72) of a turn between two yaws: a normal of `sd_rad`, and a uniform part `slip`."""
+    step = 2 * math.pi / yaws
+    reach = min(max(1, math.ceil(2 * sd_rad / step)), yaws // 2)
+    steps = np.arange(-reach, reach + 1)
+    weight = np.exp(-0.5 * (steps * step / sd_rad) ** 2)
+    row = np.zeros(yaws)
+    np.add.at(row, steps, (1 - slip) * weight / weight.sum())
+    at = np.arange(yaws)
+    return np.asarray(row[at[:, None] - at] + slip / yaws, dtype=np.float32)
 
 
 def slide_matrix(grid: Grid, p: LikelihoodParams) -> Array32:
@@ -322,8 +311,21 @@ def slide_matrix(grid: Grid, p: LikelihoodParams) -> Array32:
     return np.asarray((1 - p.slip) * weight + p.slip / len(weight), dtype=np.float32)
 
 
-def marginalise_slide(x: Array32, slide: Array32) -> Array32:
-    """Marginalise over the object's slide along axis 2 of (nb, 72, nd, nz)."""
-    top = x.max(axis=2, keepdims=True)
-    mixed = (slide.T @ np.exp(x - top).transpose(0, 3, 2, 1)).transpose(0, 3, 2, 1)
-    return np.asarray(np.log(mixed) + top, dtype=np.float32)
+def marginalised(volume: Array32, shift: Array32, turn: Array32) -> Array32:
+    """Marginalise log ratios (nb, 72, nd, nz) over a sequence's own shift and turn; return (nb, 72, n, nz).
+
+    All probabilities have a uniform part, so that no sum is below the range of 32 bit.
+
+    Args:
+        volume: Log ratios.
+        shift: Probability (nd, n) of a shift given n common ones, or (nd, 72) given the yaw: then n = 1.
+        turn: `turn_matrix`.
+    """
+    x = volume.transpose(0, 3, 2, 1)  # the order in memory
+    top = x.max(axis=(2, 3), keepdims=True)
+    near = np.exp(x - top)
+    if shift.shape[1] == near.shape[3]:
+        mixed = (near * shift).sum(axis=2, keepdims=True) @ turn
+    else:
+        mixed = shift.T @ (near @ turn)
+    return np.asarray(np.log(mixed) + top, dtype=np.float32).transpose(0, 3, 2, 1)

@@ -13,7 +13,7 @@ from glotouch_bt.perception.recognition.model.pads import Array32, PadSpec
 from glotouch_bt.perception.recognition.model.target import TargetModel
 from glotouch_bt.robot import ParamError
 
-VERSION = 4
+VERSION = 5
 """Version of the tables; increase it when a table's meaning or computation changes."""
 _NUMBERS = ("height_m", "rho", "rho_sd", "normal_dispersion", "anisotropy")
 
@@ -35,8 +35,7 @@ def to_parts(model: TargetModel) -> tuple[dict[str, Any], dict[str, Array32]]:
     arrays = {
         "reach_m": model.reach_m,
         "fine_m": model.fine_m,
-        "images": model.images_by_height,
-        "image_norms": model.image_norms,
+        "images": model.images_by_place,
     }
     return facts, arrays
 
@@ -54,7 +53,7 @@ def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32
         pad = PadSpec(**given)
         phi, l, z = (np.array(facts[k], dtype=np.float64) for k in ("phi_rad", "l_m", "z_m"))
         shape = (len(phi), len(l), len(z))
-        expected = {"reach_m": shape, "images": (*shape[::-1], 35), "image_norms": shape[::-1]}
+        expected = {"reach_m": shape, "images": (len(z), len(l), 35, len(phi))}
         for key, s in expected.items():
             if arrays[key].shape != s:
                 raise ParamError(f"table {key}", arrays[key].shape, f"{s}")
@@ -62,12 +61,11 @@ def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32
             Outline(_fit(o["as_round"]), _fit(o["as_box"]), float(o["p_box"])) for o in facts["outlines"]
         )
         numbers = {k: float(facts[k]) for k in _NUMBERS}
-        lazy = {"images": arrays["images"], "image_norms": arrays["image_norms"]}
         return TargetModel(
             name=name, digest=str(facts["digest"]), pad=pad, phi_rad=phi, l_m=l, z_m=z, reach_m=arrays["reach_m"],
             fine_m=arrays["fine_m"], outline=outline, components=tuple(components),
             centre_m=np.array(facts["centre_m"], dtype=np.float64), tops_m=np.array(facts["tops_m"], dtype=np.float64),
-            sides=(), certainty=None, mesh=None, **numbers, _lazy=lazy,
+            sides=(), certainty=None, mesh=None, **numbers, _lazy={"images": arrays["images"]},
         )  # fmt: skip
     except (KeyError, TypeError, ValueError) as e:
         raise ParamError("model parts", type(e).__name__, "complete") from e

@@ -187,21 +187,13 @@ class TargetModel:
         """(72, nl, nz, 35) image features of the LEFT pad at `pad.force_N`; built at first use (0.4 s)."""
         if "images" not in self._lazy:
             features = image_feature(pooled_images(self.fine_m, STRIDE, self.pad))
-            self._lazy["images"] = np.ascontiguousarray(features.transpose(2, 1, 0, 3), dtype=np.float32)
-        return self._lazy["images"].transpose(2, 1, 0, 3)
+            self._lazy["images"] = np.ascontiguousarray(features.transpose(2, 1, 3, 0), dtype=np.float32)
+        return self._lazy["images"].transpose(3, 1, 0, 2)
 
     @property
-    def images_by_height(self) -> Array32:
-        """The same in storage order (nz, nl, 72, 35), contiguous for neighbouring shifts at one height."""
-        return self.images.transpose(2, 1, 0, 3)
-
-    @property
-    def image_norms(self) -> Array32:
-        """(nz, nl, 72) squared norm of each image feature."""
-        if "image_norms" not in self._lazy:
-            table = self.images_by_height
-            self._lazy["image_norms"] = np.asarray(np.einsum("...i,...i->...", table, table))
-        return self._lazy["image_norms"]
+    def images_by_place(self) -> Array32:
+        """The same in storage order (nz, nl, 35, 72): all yaws of a place are compared at once."""
+        return self.images.transpose(2, 1, 3, 0)
 
     def width_at(self, l_m: float, z_m: float, phi_rad: float) -> float:
         """Return one support width by linear interpolation of the table; NaN outside it."""

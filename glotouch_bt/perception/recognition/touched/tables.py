@@ -76,13 +76,13 @@ def _build(felt: TouchedObject, pad: PadSpec) -> TargetModel:
         sd.astype(np.float32), (1.0 / (1.0 + (sd / VAGUE_M) ** 2)).astype(np.float32), image_known,
         math.hypot(TOP_SD_M, LEAN_RAD * 0.5 * max(c.size_m[0] for c in contours)) / math.sqrt(len(contours)),
     )  # fmt: skip
-    stored = np.ascontiguousarray(images.transpose(2, 1, 0, 3))
+    stored = np.ascontiguousarray(images.transpose(2, 1, 3, 0))
     long, short = max((c.size_m for c in contours), key=lambda size: size[0])
     return TargetModel(
         felt.name, digest_of(felt), pad, phi, l, z, reach.astype(np.float32), np.zeros((len(phi), 0, 0), np.float32),
         retraced(contours), np.zeros(2), felt.height_m, np.full(TOPS, felt.height_m), 0.3, 0.3, 0.0, 1.0 - short / long,
         certainty=certainty,
-        _lazy={"images": stored, "image_norms": np.einsum("...i,...i->...", stored, stored)},
+        _lazy={"images": stored},
     )  # fmt: skip
 
 
