@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -26,7 +25,7 @@ from glotouch_bt.mission.check.requirements import all_requirements
 from glotouch_bt.mission.check.rules import projected
 from glotouch_bt.mission.check.variables_of import variables_of
 from glotouch_bt.mission.nodes import ConditionSettings, condition, repeat
-from glotouch_bt.mission.nodes.base import EMPTY, StateSets
+from glotouch_bt.mission.nodes.base import EMPTY
 from glotouch_bt.mission.nodes.timeout import ClockTimeout
 from glotouch_bt.mission.read.parse import parse_tree
 from glotouch_bt.mission.read.scope import Scope
@@ -378,42 +377,3 @@ def test_variables_that_decide_nothing_need_not_be_followed(tree: Any) -> None:
         patch.setattr(judge, "projected", DataFlow)
         judge.check_flow(spec, SKILLS, everything, {}, 60.0)
     assert shown.sorted() == everything.sorted()
-
-
-def holds(algebra: StateSets, given: int, state: tuple[int, ...]) -> bool:
-    for variable, value in enumerate(state):
-        given = algebra.where(given, variable, (value,))
-    return given != EMPTY
-
-
-@settings(max_examples=200, deadline=None)
-@given(
-    sizes=st.lists(st.integers(2, 3), min_size=1, max_size=4),
-    steps=st.lists(st.tuples(st.integers(0, 4), st.integers(0, 3), st.integers(0, 7), st.integers(0, 9)), max_size=12),
-)
-def test_diagrams_are_sets(sizes: list[int], steps: list[tuple[int, int, int, int]]) -> None:
-    """Every operation of `StateSets` against plain sets of tuples."""
-    algebra = StateSets(sizes)
-    kept: list[tuple[int, set[tuple[int, ...]]]] = [(EMPTY, set()), (algebra.start, {(0,) * len(sizes)})]
-    for operation, variable, bits, which in steps:
-        variable %= len(sizes)
-        values = [v for v in range(sizes[variable]) if bits >> v & 1]
-        (a, plain), (b, other) = kept[-1], kept[which % len(kept)]
-        if operation == 0:
-            made, want = algebra.union(a, b), plain | other
-        elif operation == 1:
-            made, want = algebra.meet(a, b), plain & other
-        elif operation == 2:
-            made, want = algebra.where(a, variable, values), {c for c in plain if c[variable] in values}
-        else:
-            want = {(*c[:variable], v, *c[variable + 1 :]) for c in plain for v in values}
-            made = algebra.allow(a, variable, values)
-            want |= plain
-            if operation == 3 and values:
-                made = algebra.assign(a, variable, values[0])
-                want = {(*c[:variable], values[0], *c[variable + 1 :]) for c in plain}
-        assert {c for c in product(*map(range, sizes)) if holds(algebra, made, c)} == want
-        assert algebra.values(made, variable) == {c[variable] for c in want}
-        for before, same in kept:
-            assert (before == made) == (same == want)
-        kept.append((made, want))
