@@ -11,6 +11,7 @@ import numpy as np
 from glotouch_bt.perception.search.moves import Move, SearchPlan
 from glotouch_bt.perception.search.tracing.trace_params import Elsewhere, TraceParams
 from glotouch_bt.perception.search.tracing.trace_state import BEARINGS, OutlineTrace, TraceState, all_bearings, unit
+from glotouch_bt.perception.search.tracing.ways import doubt_on_way, free_column, places_beside, way_round
 from glotouch_bt.perception.touch import Contact
 from glotouch_bt.perception.touch.outline import OutlineBelief, wrapped
 from glotouch_bt.robot import Array
@@ -86,7 +87,7 @@ def trace_more(
     s.known, s.given, s.columns = len(known), len(known), columns or s.columns
     outline, bearings = s.outline(), all_bearings()
     distance, sd = s.ring(outline, bearings, p)
-    walled = np.any(np.abs(_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
+    walled = np.any(np.abs(places_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
     for i in _apart(np.where(walled, -1.0, sd), p.misses):
         down, met = yield from _come_down(outline, s, p, float(bearings[i]))
         if not down:
@@ -220,7 +221,7 @@ def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | Non
     bearings = all_bearings()
     distance, sd = s.ring(outline, bearings, p)
     here = s.bearing(outline)
-    walled = np.any(np.abs(_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
+    walled = np.any(np.abs(places_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
     over_m = np.where(walled, np.inf, p.hop_m)
     best, worth = None, 0.0
     step = 2 * np.pi / BEARINGS
@@ -263,9 +264,9 @@ def _probe_at(outline: OutlineBelief, s: TraceState, p: TraceParams, aim: _Aim) 
             return met
     else:
         beside = float(np.linalg.norm(s.tip - s.raw[-1].tip_K_m[:2])) < 3.0 * p.clearance_m
-        if beside and _doubt(outline, s, p, aim.bearing, aim.side) > p.doubt_m:
+        if beside and doubt_on_way(outline, s, p, aim.bearing, aim.side) > p.doubt_m:
             return (yield from _along(s, p, aim.side))
-        for waypoint in _way_round(outline, s, p, aim.bearing, aim.side):
+        for waypoint in way_round(outline, s, p, aim.bearing, aim.side):
             outcome = yield Move("step", waypoint)
             s.record(outcome)
             if outcome.refused:
@@ -293,10 +294,10 @@ def _come_down(
     at = np.array([bearing])
     distance, sd = s.ring(outline, at, p)
     for farther in OUTWARDS_M:
-        place = _beside(outline, at, distance + farther, sd, p)[0]
+        place = places_beside(outline, at, distance + farther, sd, p)[0]
         if np.any(np.abs(place) > s.half):
             return False, None
-        column = _column(outline, s, p, place) if farther == 0.0 else None
+        column = free_column(outline, s, p, place) if farther == 0.0 else None
         outcome = yield Move("hop", place if column is None else column)
         s.record(outcome)
         if outcome.refused:
@@ -309,30 +310,6 @@ def _come_down(
             s.record(outcome)
         return not outcome.refused, outcome.contact
     return False, None
-
-
-def _column(outline: OutlineBelief, s: TraceState, p: TraceParams, place: Array) -> Array | None:
-    """Return the nearest free column from which the ball can step to `place` beside the outline, or None."""
-    found = s.columns()
-    away = np.linalg.norm(found - place, axis=1)
-    for i in np.argsort(away, kind="stable"):
-        if away[i] > p.aside_m:
-            break
-        if _clear(s, found[i], place, outline, p):
-            return np.asarray(found[i])
-    return None
-
-
-def _beside(outline: OutlineBelief, bearings: Array, distance: Array, sd: Array, p: TraceParams) -> Array:
-    """Return positions (n, 2) for the descent, outside the outline predicted at these distances."""
-    ring = distance + p.clearance_m + np.minimum(2.0 * sd, p.widest_margin_m)
-    return np.asarray(outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)]))
-
-
-def _doubt(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float, side: float) -> float:
-    """Return the maximum standard deviation of the outline on the way to `bearing`."""
-    _, sd = s.ring(outline, _angles(outline, s, bearing, side), p)
-    return float(np.max(sd))
 
 
 def _along(s: TraceState, p: TraceParams, side: float) -> SearchPlan[Contact | None]:
@@ -364,41 +341,3 @@ def _feel_about(s: TraceState, p: TraceParams) -> SearchPlan[Contact | None]:
         if found is not None:
             return found
     return None
-
-
-def _angles(outline: OutlineBelief, s: TraceState, bearing: float, side: float) -> Array:
-    """Return the bearings (k,) on the way around from the ball (excluded) to `bearing`."""
-    here = s.bearing(outline)
-    turn = float(wrapped(np.array(side * (bearing - here))) % (2 * np.pi))
-    n = max(int(np.ceil(turn / np.deg2rad(5.0))), 1)
-    return np.asarray(here + side * np.linspace(0.0, turn, n + 1)[1:])
-
-
-def _way_round(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float, side: float) -> Array:
-    """Return waypoints (k, 2) outside the predicted outline from the ball to `bearing`, with shortcuts."""
-    angles = _angles(outline, s, bearing, side)
-    ring = s.passing(outline, angles, p)
-    points = outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-    points = np.clip(points, -s.half, s.half)
-    return _tight(s, points, outline, p)
-
-
-def _tight(s: TraceState, points: Array, outline: OutlineBelief, p: TraceParams) -> Array:
-    """Remove waypoints whose shortcut keeps the clearance from the predicted outline."""
-    kept: list[Array] = []
-    here, i = s.tip, 0
-    while i < len(points):
-        j = len(points) - 1
-        while j > i and not _clear(s, here, points[j], outline, p):
-            j -= 1
-        here = points[j]
-        kept.append(here)
-        i = j + 1
-    return np.array(kept)
-
-
-def _clear(s: TraceState, a: Array, b: Array, outline: OutlineBelief, p: TraceParams) -> bool:
-    t = np.linspace(0.0, 1.0, 12)[1:-1, None]
-    d = (1 - t) * a + t * b - outline.centre_K_m
-    least = s.passing(outline, np.arctan2(d[:, 1], d[:, 0]), p, 0.7, 0.5)
-    return bool(np.all(np.hypot(d[:, 0], d[:, 1]) >= least))
