@@ -96,7 +96,9 @@ class TouchNext(Skill):
     touchsets = Out(tuple, "touches, one TouchSet for each candidate", element=TouchSet)
     refused = Out(tuple, "closures that could not be made: candidate, yaw in degrees, height and place in mm")
     doubtful = Out(
-        tuple, "indices of candidates on which closures met something, and none since felt them as traced", element=int
+        tuple,
+        "indices of candidates that may have moved: a closure met something, none has felt them since",
+        element=int,
     )
     cramped = Out(
         tuple, "indices of candidates on which closures lack only space, most probable first", element=int, always=True

@@ -87,9 +87,10 @@ def pays_now(belief: Belief, option: ProbeOption, unmeasured: set[int]) -> bool:
         option: What is left to measure of the candidate.
         unmeasured: All candidates that were not measured completely.
     """
-    share, index = {m.index: m.probability for m in belief.ranking.matches}, option.touch.candidate
-    before = sum(p for i, p in share.items() if i not in unmeasured or i == best_of(belief).index)
-    return index == best_of(belief).index or share[index] * CHANGE_S >= before * (option.seconds + option.more_s)
+    share = {m.index: m.probability for m in belief.ranking.matches}
+    index, best = option.touch.candidate, best_of(belief).index
+    before = sum(p for i, p in share.items() if i not in unmeasured or i == best)
+    return index == best or share[index] * CHANGE_S >= before * (option.seconds + option.more_s)
 
 
 def wanted(belief: Belief, confidence: float, hopeless: frozenset[int]) -> set[int]:

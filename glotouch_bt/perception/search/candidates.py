@@ -234,9 +234,9 @@ def joins(known: tuple[Candidate, ...], contacts: tuple[Contact, ...], radius_m:
 
 
 def of_another(known: tuple[Candidate, ...], radius_m: float, contacts: tuple[Contact, ...], contact: Contact) -> bool:
-    """Return True if a new contact of a trace belongs to another candidate: it lies near one that explains it better.
+    """Return True if a new contact of a trace belongs to another candidate, which is near and explains it better.
 
-    A candidate that is hardly known is no other: it may be a part of the object that is traced.
+    A candidate with an uncertain centre does not count: it may be a part of the traced object.
 
     Args:
         known: The other candidates.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from glotouch_bt.perception.touch import Contact
 
 Elsewhere = Callable[[tuple[Contact, ...], Contact], bool]
-"""Called with the contacts of a trace and a new one; returns True if that belongs to another, known object."""
+"""Function of the contacts of a trace and a new contact: True if the new one belongs to another, known object."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,8 @@
-"""Ways of the ball around a predicted outline, and places beside it."""
+"""Ways of the ball around a predicted outline, and places beside it.
+
+Bearings are in rad, seen from the outline's centre. `side` is the direction around it: +1 counter-clockwise, -1
+clockwise. Lengths are in m, positions in K.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +24,16 @@ def way_round(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: fl
 
 
 def doubt_on_way(outline: OutlineBelief, s: TraceState, p: TraceParams, bearing: float, side: float) -> float:
-    """Return the maximum standard deviation of the outline on the way to `bearing`."""
+    """Return the maximum standard deviation of the outline, m, on the way from the ball to `bearing`."""
     _, sd = s.ring(outline, _angles(outline, s, bearing, side), p)
     return float(np.max(sd))
 
 
 def places_beside(outline: OutlineBelief, bearings: Array, distance: Array, sd: Array, p: TraceParams) -> Array:
-    """Return positions (n, 2) for the descent, outside the outline predicted at these distances."""
+    """Return positions (n, 2) for the descent at bearings (n,), outside an outline at `distance` (n,) from its centre.
+
+    `sd` (n,) is the standard deviation of that distance.
+    """
     ring = distance + p.clearance_m + np.minimum(2.0 * sd, p.widest_margin_m)
     return np.asarray(outline.centre_K_m + ring[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)]))
 
@@ -66,6 +73,7 @@ def _tight(s: TraceState, points: Array, outline: OutlineBelief, p: TraceParams)
 
 
 def _clear(s: TraceState, a: Array, b: Array, outline: OutlineBelief, p: TraceParams) -> bool:
+    """Return True if the straight way from a to b keeps its distance from the outline."""
     t = np.linspace(0.0, 1.0, 12)[1:-1, None]
     d = (1 - t) * a + t * b - outline.centre_K_m
     least = s.passing(outline, np.arctan2(d[:, 1], d[:, 0]), p, 0.7, 0.5)
