@@ -48,9 +48,10 @@ def accelerating(
     wrench: Array,
     com: Array,
 ) -> float:
-    """Add a block to the motion of the last 2 `HALF` + 1 blocks; return its mean acceleration, -1 if it is too short.
+    """Add a block to the motion of the last 2 `HALF` + 1 blocks; return its mean acceleration, m/s2.
 
-    The acceleration is a second difference at the true times. A force averaged with `WEIGHTS` belongs to it.
+    Negative if the hand slows down, zero if the motion is too short. The acceleration is a second difference at the
+    true times. A force averaged with `WEIGHTS` belongs to it.
 
     Args:
         track, forces: (2 HALF + 1, 4) stamps and centres of the hand's mass in B, and (2 HALF, 3) mean forces, newest
@@ -79,21 +80,24 @@ def accelerating(
         for row in range(last):
             mean[axis] += WEIGHTS[row] * forces[row, axis]
     if known < last:
-        return -1.0
+        return 0.0
     before_s, after_s = track[HALF, 0] - track[0, 0], track[last, 0] - track[HALF, 0]
-    bend_2 = 0.0
+    bend_2, gain = 0.0, 0.0
     for axis in range(1, 4):
-        after, before = track[last, axis] - track[HALF, axis], track[HALF, axis] - track[0, axis]
-        bend_2 += (after / after_s - before / before_s) ** 2
+        after = (track[last, axis] - track[HALF, axis]) / after_s
+        before = (track[HALF, axis] - track[0, axis]) / before_s
+        bend_2 += (after - before) ** 2
+        gain += (after - before) * (after + before)
     acceleration: float = 2.0 * math.sqrt(bend_2) / (before_s + after_s)
-    return acceleration
+    return acceleration if gain >= 0.0 else -acceleration
 
 
 class WristResponseGuard:
     """Compare the force on the wrist with the inertial force of the hand, once a period.
 
-    Both are squared and summed while the hand accelerates, also over several motions. The direction does not matter: a
-    sensor that shows something else is not silent, and contacts only add.
+    Both are squared and summed while the hand gains speed, also over several motions. A hand that loses speed does not
+    count: a contact that stops it cancels its inertia at the wrist. The direction of the force does not matter, because
+    a sensor that shows something else is not silent.
 
     Args:
         robot: The guarded robot.
@@ -126,11 +130,13 @@ class WristResponseGuard:
             self._com_P,
         )  # fmt: skip
         self._known += 1
-        if acceleration_m_s2 < 0.0:
+        if self._known <= 2 * HALF:
             return
-        inertia_N = self._mass_kg * acceleration_m_s2
+        inertia_N = self._mass_kg * abs(acceleration_m_s2)
         if inertia_N < MIN_INERTIA_N or self._rest is None:
             self._rest = self._force.copy() if inertia_N < MIN_INERTIA_N else None
+            return
+        if acceleration_m_s2 < 0.0:
             return
         change = self._force - self._rest
         self._due += inertia_N**2

@@ -83,5 +83,28 @@ def test_wrench_silent__before_the_hand_is_fast(change: Callable[[Array], Array]
     assert trip.value.stamp_s < 0.25
 
 
+def silent(begin: int, end: int) -> Callable[[Array], Array]:
+    """Return a change that shows nothing in some blocks."""
+    blocks = 0
+
+    def alter(wrench: Array) -> Array:
+        nonlocal blocks
+        blocks += 1
+        return 0.0 * wrench if begin <= blocks < end else wrench
+
+    return alter
+
+
+def test_a_contact_that_stops_the_hand_cancels_its_inertia() -> None:
+    """`swing` gains speed in the blocks 11 to 30, and loses it in 31 to 50 and 71 to 90."""
+    assert swing(Supervisor(Heavy(0.0, silent(34, 48))), 0.8, 0.4) == []
+
+
+def test_a_wrist_that_dies_is_found_when_the_hand_gains_speed_again() -> None:
+    with pytest.raises(GuardTripped, match="wrench_silent") as trip:
+        swing(Supervisor(Heavy(0.0, silent(34, 1000))), 0.8, 0.4)
+    assert trip.value.stamp_s < 0.65
+
+
 def test_a_robot_without_physics_is_not_judged() -> None:
     assert swing(Supervisor(FakeRobot())) == []
