@@ -37,14 +37,12 @@ class MujocoReferee:
     def objects(self) -> list[TrueObject]:
         """See `Referee`; in the world's order."""
         r = self._robot
-        touching = self._touching()
-        left, right = r.handles.pad_geoms
-        pads = [touching.get(g, set()) for g in (left, right)]
+        _, *fingers = range(r.handles.hand_bodies.start, r.handles.hand_bodies.stop)
         result = []
         for body, item in zip(r.handles.object_bodies, r.truth.objects, strict=True):
             pose = body_pose(r.data, body)
             seen = pose.apply(item.mesh.vertices_m)[:, :2]
-            held = all(body in p for p in pads) and not self._on(body, r.handles.container_body)
+            held = all(self._on(body, f) for f in fingers) and not self._on(body, r.handles.container_body)
             outline = seen[scipy.spatial.ConvexHull(seen).vertices]
             result.append(TrueObject(item.mesh.name, pose, item.mass_kg, outline, held, np.array(item.mesh.extents_m)))
         return result
@@ -85,15 +83,6 @@ class MujocoReferee:
         """See `Referee`."""
         trace = self._robot.trace
         return None if trace is None else trace.replay(self._robot.data)
-
-    def _touching(self) -> dict[int, set[int]]:
-        """Return the bodies in contact with each geom."""
-        r = self._robot
-        result: dict[int, set[int]] = {}
-        for first, second in r.data.contact.geom:
-            result.setdefault(int(first), set()).add(int(r.model.geom_bodyid[second]))
-            result.setdefault(int(second), set()).add(int(r.model.geom_bodyid[first]))
-        return result
 
     def _on(self, body: int, other: int) -> bool:
         """Return True if two bodies are in contact."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -132,3 +133,22 @@ def test_a_lifted_block_does_not_creep(over_block: Any) -> None:
     assert np.linalg.norm(after) < 5e-5  # friction holds, it does not creep
     over_block.jaws(0.085, 30.0, 0.2, 0.5)
     assert not referee.objects()[0].in_gripper
+
+
+def test_an_object_between_one_pad_and_the_other_finger_is_held(open_robot: Open, drive: Drive) -> None:
+    """The fingers are longer than the pads: an object may hang between them and miss a pad."""
+    driver = drive(open_robot())
+    driver.line((0.60, 0.0, 0.10))
+    robot, referee = driver.robot, MujocoBackend().referee(driver.robot)
+    assert referee is not None
+    gripper, (block,) = robot.description.gripper, robot.handles.object_bodies
+    above_pads_m = 0.5 * gripper.pad_window_m[1] + 0.032  # the block is 60 mm high
+    site, data = robot.handles.pads_site, robot.data
+    data.qpos[robot.handles.jaw_qpos] = 0.5 * 0.036 - 0.0025  # the pads stand 2 mm proud of the fingers
+    first = int(robot.model.body_jntadr[block])
+    address = int(robot.model.jnt_qposadr[first])
+    rotation = data.site_xmat[site].reshape(3, 3)
+    data.qpos[address : address + 3] = data.site_xpos[site] - above_pads_m * rotation[:, 2]
+    mujoco.mju_mat2Quat(data.qpos[address + 3 : address + 7], data.site_xmat[site])
+    mujoco.mj_forward(robot.model, data)
+    assert referee.objects()[0].in_gripper
