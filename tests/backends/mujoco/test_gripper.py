@@ -135,14 +135,14 @@ def test_a_lifted_block_does_not_creep(over_block: Any) -> None:
     assert not referee.objects()[0].in_gripper
 
 
-def test_an_object_between_one_pad_and_the_other_finger_is_held(open_robot: Open, drive: Drive) -> None:
+def test_an_object_between_the_fingers_is_held_also_beside_the_pads(open_robot: Open, drive: Drive) -> None:
     """The fingers are longer than the pads: an object may hang between them and miss a pad."""
     driver = drive(open_robot())
     driver.line((0.60, 0.0, 0.10))
     robot, referee = driver.robot, MujocoBackend().referee(driver.robot)
     assert referee is not None
     gripper, (block,) = robot.description.gripper, robot.handles.object_bodies
-    above_pads_m = 0.5 * gripper.pad_window_m[1] + 0.032  # the block is 60 mm high
+    above_pads_m = 0.5 * gripper.pad_window_m[1] + 0.062  # the block's origin is in its base, 60 mm below its top
     site, data = robot.handles.pads_site, robot.data
     data.qpos[robot.handles.jaw_qpos] = 0.5 * 0.036 - 0.0025  # the pads stand 2 mm proud of the fingers
     first = int(robot.model.body_jntadr[block])
@@ -151,4 +151,5 @@ def test_an_object_between_one_pad_and_the_other_finger_is_held(open_robot: Open
     data.qpos[address : address + 3] = data.site_xpos[site] - above_pads_m * rotation[:, 2]
     mujoco.mju_mat2Quat(data.qpos[address + 3 : address + 7], data.site_xmat[site])
     mujoco.mj_forward(robot.model, data)
+    assert not {*robot.handles.pad_geoms} & {*data.contact.geom.ravel().tolist()}
     assert referee.objects()[0].in_gripper
