@@ -17,7 +17,7 @@ class TrueObject:
         pose_B_O: The mesh frame in B.
         mass_kg: Mass.
         outline_B_m: (n, 2) convex outline of the mesh in its present pose, in the xy plane of B.
-        in_gripper: True if both fingers touch it, each with its pad or beside it, and it does not touch the container.
+        in_gripper: True if it touches both fingers, on the pads or beside them, and not the container.
         size_m: (3,) its true size along the axes of the mesh frame.
     """
 

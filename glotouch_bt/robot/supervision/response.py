@@ -82,14 +82,14 @@ def accelerating(
     if known < last:
         return 0.0
     before_s, after_s = track[HALF, 0] - track[0, 0], track[last, 0] - track[HALF, 0]
-    bend_2, gain = 0.0, 0.0
+    bend_2, gain_2 = 0.0, 0.0  # squared change of the velocity, change of the squared speed
     for axis in range(1, 4):
         after = (track[last, axis] - track[HALF, axis]) / after_s
         before = (track[HALF, axis] - track[0, axis]) / before_s
         bend_2 += (after - before) ** 2
-        gain += (after - before) * (after + before)
+        gain_2 += (after - before) * (after + before)
     acceleration: float = 2.0 * math.sqrt(bend_2) / (before_s + after_s)
-    return acceleration if gain >= 0.0 else -acceleration
+    return acceleration if gain_2 >= 0.0 else -acceleration
 
 
 class WristResponseGuard:

@@ -11,9 +11,11 @@ import pytest
 
 from glotouch_backends.mujoco import MujocoBackend
 from glotouch_backends.mujoco.control.jaws import JawReports
+from glotouch_backends.mujoco.model.gripper import PAD_PROUD_M
 from glotouch_backends.mujoco.robot import MujocoRobot
 from glotouch_backends.mujoco.sensing.tactile import PadContacts
 from glotouch_bt.robot import Command, Conditions, GripperState, GripperTarget, ParamError, SetPayload
+from tests.backends.mujoco.conftest import BLOCK_M
 
 Open = Callable[..., MujocoRobot]
 Drive = Callable[[MujocoRobot], Any]
@@ -142,11 +144,10 @@ def test_an_object_between_the_fingers_is_held_also_beside_the_pads(open_robot: 
     robot, referee = driver.robot, MujocoBackend().referee(driver.robot)
     assert referee is not None
     gripper, (block,) = robot.description.gripper, robot.handles.object_bodies
-    above_pads_m = 0.5 * gripper.pad_window_m[1] + 0.062  # the block's origin is in its base, 60 mm below its top
+    above_pads_m = 0.5 * gripper.pad_window_m[1] + BLOCK_M[2] + 0.002  # the block's origin is in its base
     site, data = robot.handles.pads_site, robot.data
-    data.qpos[robot.handles.jaw_qpos] = 0.5 * 0.036 - 0.0025  # the pads stand 2 mm proud of the fingers
-    first = int(robot.model.body_jntadr[block])
-    address = int(robot.model.jnt_qposadr[first])
+    data.qpos[robot.handles.jaw_qpos] = 0.5 * BLOCK_M[1] - PAD_PROUD_M - 0.0005  # the fingers press into the block
+    address = int(robot.model.jnt_qposadr[robot.model.body_jntadr[block]])
     rotation = data.site_xmat[site].reshape(3, 3)
     data.qpos[address : address + 3] = data.site_xpos[site] - above_pads_m * rotation[:, 2]
     mujoco.mju_mat2Quat(data.qpos[address + 3 : address + 7], data.site_xmat[site])

@@ -84,7 +84,7 @@ def test_wrench_silent__before_the_hand_is_fast(change: Callable[[Array], Array]
 
 
 def silent(begin: int, end: int) -> Callable[[Array], Array]:
-    """Return a change that shows nothing in some blocks."""
+    """Return a change that shows no force in the blocks `begin` to `end` - 1."""
     blocks = 0
 
     def alter(wrench: Array) -> Array:
