@@ -40,6 +40,8 @@ calibrated."""
 DISPLACED_M = 0.010
 """Motion of an object during a trace beyond which it may have moved further unseen. Source: ours, not calibrated; a
 trace follows at most 15 mm."""
+MAX_BACK_M = 0.010
+"""Maximum length of a retreat back the way the ball came. Source: ours."""
 OFF_TOP_M = 0.006
 """Raise the ball by this much from what it landed on."""
 
@@ -90,6 +92,7 @@ class Explorer:
         self._prober = Prober(context, tool, GuardParams())
         self._arm, self._tool, self._speeds, self._journal = context.arm, tool, speeds, journal
         probe = context.world.probe
+        self._began_K_m = self._prober.tip_K_m
         self._weight_N = probe.mass_kg * GRAVITY_M_S2 if context.arm.scene.holding_tool else math.inf
 
     @property
@@ -186,16 +189,29 @@ class Explorer:
         s = self._speeds
         speed = {"sweep": s.sweep_m_s, "step": s.step_m_s, "probe": s.probe_m_s}[move.kind]
         goal = np.array([*move.goal_K_m, self._height_m])
+        self._began_K_m = self._prober.tip_K_m
         probed = yield from self._prober.move(goal, speed, any_direction=move.kind == "step")
         return probed.contact, probed.path_K_m
 
     def _retreat(self, goal_K_m: Array) -> Motion[tuple[None, Array]]:
+        """Retreat from a contact to `goal_K_m` (2,), or back the way the ball came if a wall is in that direction.
+
+        The ball must not stay in contact: the next rest would measure the force of the contact as the wrench without
+        one, and the guard would report a contact on the opposite side.
+        """
         before = self._prober.tip_K_m
-        way = goal_K_m - before[:2]
-        length = float(np.linalg.norm(way))
-        if length > 1e-4:
-            yield from self._prober.retreat(np.array([*(way / length), 0.0]), length, self._speeds.step_m_s)
+        try:
+            yield from self._back_off(goal_K_m - before[:2])
+        except MotionRefused:
+            back = (self._began_K_m - before)[:2]
+            yield from self._back_off(back * min(1.0, MAX_BACK_M / max(float(np.linalg.norm(back)), 1e-9)))
         return None, np.array([before, self._prober.tip_K_m])
+
+    def _back_off(self, way_K_m: Array) -> Motion[None]:
+        """Move the ball by `way_K_m` (2,) without a guard."""
+        length = float(np.linalg.norm(way_K_m))
+        if length > 1e-4:
+            yield from self._prober.retreat(np.array([*(way_K_m / length), 0.0]), length, self._speeds.step_m_s)
 
     def _hop(self, goal_K_m: Array) -> Motion[tuple[Contact | None, Array]]:
         s, tip = self._speeds, self._prober.tip_K_m
