@@ -72,7 +72,7 @@ def predict(reading: TouchSetReading, pair: Pair, p: LikelihoodParams) -> Predic
     candidate, model = reading.touchset.candidate, pair.hypothesis.model
     z0 = span(p.z0_limit_m, p.z0_steps)
     if pair.log_pose is None:
-        log_pose = yaw_prior(model, candidate, pair.first_rad, p)[:, None]
+        log_pose = yaw_prior(model, candidate, pair.section, pair.first_rad, p)[:, None]
         z0 = np.zeros(1)
     else:
         log_pose = pair.log_pose.astype(np.float64)

@@ -13,6 +13,7 @@ from glotouch_bt.perception.recognition.decision import Fit
 from glotouch_bt.perception.recognition.evidence import Evidence, read_evidence
 from glotouch_bt.perception.recognition.likelihood.background import log_generic_images, log_generic_widths
 from glotouch_bt.perception.recognition.likelihood.bands import Residual, log_banded_twin, residual
+from glotouch_bt.perception.recognition.likelihood.contacts import SectionFit, section_fit
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.relief import LikelyPose, log_generic_reliefs, relief_ratio
 from glotouch_bt.perception.recognition.likelihood.scalars import (
@@ -74,13 +75,14 @@ class Pair:
         index: Index of the candidate.
         log_ratio: log p(TouchSet | target) - log p(TouchSet | random object), tempered and calibrated.
         log_twin: log p(TouchSet | twin) - log p(TouchSet | target), from the widths, calibrated.
-        terms: Terms of the ratio, nats before calibration: mode, height, contour; width and image at the best pose;
-            pose: effect of the marginalisation over the pose; relief: only with gel images.
+        terms: Terms of the ratio, nats before calibration: height; section, or mode and contour; width and image at
+            the best pose; pose: effect of the marginalisation over the pose; relief: only with gel images.
         log_pose: (72, nz) posterior of (relative yaw of the first sequence, height offset); None without contact.
         first_rad: Yaw of the first sequence's hand.
         bias_m: Best aperture bias.
         fit, pose_K_O, evidence: As in `Match`.
         hypothesis: The likeliest way in which the target stands.
+        section: The candidate's contacts in its section; None if they are not compared with it.
     """
 
     index: int
@@ -94,6 +96,7 @@ class Pair:
     pose_K_O: tuple[float, float, float]
     evidence: float
     hypothesis: TargetHypothesis
+    section: SectionFit | None = None
 
 
 def read_touchset(touchset: TouchSet, pad: PadSpec, p: LikelihoodParams) -> TouchSetReading:
@@ -123,23 +126,26 @@ def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -
     Hypotheses that outline and height make far less likely than the best are left out.
     """
     candidate = reading.touchset.candidate
-    terms = [_scalar_terms(h.model, candidate, p) for h in model.hypotheses]
+    fits = [section_fit(h.model, candidate) for h in model.hypotheses]
+    terms = [_scalar_terms(h.model, candidate, f, p) for h, f in zip(model.hypotheses, fits, strict=True)]
     cheap = np.array(
         [math.log(h.weight) + p.slope * sum(t.values()) for h, t in zip(model.hypotheses, terms, strict=True)]
     )
-    kept = [(h, t) for h, t, c in zip(model.hypotheses, terms, cheap, strict=True) if c > cheap.max() - PRUNE_NATS]
-    searches = [_Search.of(h, reading, t, p) for h, t in kept]
+    kept = [i for i, c in enumerate(cheap) if c > cheap.max() - PRUNE_NATS]
+    searches = [_Search.of(model.hypotheses[i], reading, terms[i], fits[i], p) for i in kept]
     log_ratios = [s.log_ratio + math.log(s.hypothesis.weight) for s in searches]
     best = searches[int(np.argmax(log_ratios))]
     return best.pair(float(np.logaddexp.reduce(log_ratios)), p)
 
 
-def _scalar_terms(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> dict[str, float]:
-    terms = {
-        "mode": mode_ratio(model, candidate),
-        "height": height_ratio(model, candidate, p),
-        "contour": contour_ratio(model, candidate, p),
-    }
+def _scalar_terms(
+    model: TargetModel, candidate: Candidate, fit: SectionFit | None, p: LikelihoodParams
+) -> dict[str, float]:
+    terms = {"height": height_ratio(model, candidate, p)}
+    if fit is not None:
+        terms |= {"section": fit.term(p)}
+    else:
+        terms |= {"mode": mode_ratio(model, candidate), "contour": contour_ratio(model, candidate, p)}
     return {name: p.temper_outline * value for name, value in terms.items()}
 
 
@@ -183,6 +189,7 @@ class _Search:
         hypothesis: How the target stands.
         reading: Background evidence of the touches.
         terms: Terms of outline, height and relief.
+        section: As in `Pair`.
         grid: Grid of the nuisances.
         common: Log prior of yaw, shift and height offset.
         log_bias: (nb,) log prior of the bias.
@@ -195,6 +202,7 @@ class _Search:
     hypothesis: TargetHypothesis
     reading: TouchSetReading
     terms: dict[str, float]
+    section: SectionFit | None
     grid: Grid
     common: Array
     log_bias: Array
@@ -205,9 +213,10 @@ class _Search:
 
     @classmethod
     def of(
-        cls, hypothesis: TargetHypothesis, reading: TouchSetReading, terms: dict[str, float], p: LikelihoodParams
-    ) -> _Search:
-        """Search the poses; `terms` are those of outline and height."""
+        cls, hypothesis: TargetHypothesis, reading: TouchSetReading, terms: dict[str, float], fit: SectionFit | None,
+        p: LikelihoodParams,
+    ) -> _Search:  # fmt: skip
+        """Search the poses; `terms` are those of outline and height, `fit` is that of the contacts."""
         model, touchset = hypothesis.model, reading.touchset
         bias_sd = _bias_sd_m(reading, p) if reading.sequences else p.offset_sd_m
         grid = Grid.of(p, bias_sd)
@@ -216,14 +225,20 @@ class _Search:
             ratio = p.outline_offset + p.slope * sum(terms.values())
             none = np.zeros((1, 1, 1, 1))
             return cls(
-                hypothesis, reading, terms, grid, none, log_bias, (), none.astype(np.float32), 0.0, ratio
+                hypothesis, reading, terms, fit, grid, none, log_bias, (), none.astype(np.float32), 0.0, ratio
             )  # fmt: skip
         first = reading.sequences[0][0].layer.yaw_rad
         turns = np.array([seen[0].layer.yaw_rad - first for seen in reading.sequences])
         parallel = bool(np.abs((turns + np.pi / 2) % np.pi - np.pi / 2).max() < PARALLEL_RAD)
-        common = yaw_prior(model, touchset.candidate, first, p)[None, :, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
+        yaws = yaw_prior(model, touchset.candidate, fit, first, p)
+        common = yaws[None, :, None, None] + _log_normal(grid.z0_m, p.z0_sd_m)
+
+        def shift_at(turn_rad: float) -> Array:
+            phi = model.phi_rad + turn_rad
+            return shift_prior(model, touchset.candidate, fit, first + turn_rad, phi, grid.shift_m, p)
+
         if parallel:  # parallel tracks share one shift along x_P; each may slide
-            common = common + shift_prior(model, touchset.candidate, 0.0, grid.shift_m, p)[None, :, :, None]
+            common = common + shift_at(0.0)[None, :, :, None]
         slide = slide_matrix(grid, p)
         moved = observed_turns(touchset)
         parts = []
@@ -233,7 +248,7 @@ class _Search:
             if parallel:  # the hand may point the other way
                 shift = slide if np.cos(turn) >= 0 else slide[::-1]
             else:
-                shift = np.exp(shift_prior(model, touchset.candidate, turn, grid.shift_m, p).T).astype(np.float32)
+                shift = np.exp(shift_at(turn).T).astype(np.float32)
             sd = math.hypot(p.turn_sd_rad, moved[seen[0].layer.sequence])
             tempered = np.float32(p.temper_width) * widths, np.float32(p.temper_image) * image
             moves = shift, turn_matrix(len(model.phi_rad), sd, p.slip)
@@ -242,7 +257,7 @@ class _Search:
         for part in parts:
             joint = joint + part.marginal(part.widths)
         total = float(log_sum(joint.reshape(1, -1), 1)[0])
-        found = cls(hypothesis, reading, terms, grid, common, log_bias, tuple(parts), joint, total, 0.0)
+        found = cls(hypothesis, reading, terms, fit, grid, common, log_bias, tuple(parts), joint, total, 0.0)
         return found._with_relief(p)
 
     def shift_indices(self, at: tuple[int, int, int, int]) -> list[int]:
@@ -275,7 +290,9 @@ class _Search:
         index, weight = touchset.candidate.index, self.reading.evidence.weight
         if not self.parts:
             pose = contour_pose(touchset)
-            return Pair(index, log_ratio, 0.0, self.terms, None, 0.0, 0.0, None, pose, 0.0, self.hypothesis)
+            return Pair(
+                index, log_ratio, 0.0, self.terms, None, 0.0, 0.0, None, pose, 0.0, self.hypothesis, self.section
+            )  # fmt: skip
         b, i, c, z = (int(k) for k in np.unravel_index(int(np.argmax(self.joint)), self.joint.shape))
         at = self.shift_indices((b, i, c, z))
         width = sum(float(part.widths[b, i, d, z]) for part, d in zip(self.parts, at, strict=True))
@@ -290,7 +307,7 @@ class _Search:
         first = self.reading.sequences[0][0].layer.yaw_rad
         return Pair(
             index, log_ratio, self._log_twin((i, z), at, p), terms, np.asarray(log_pose - self.total, dtype=np.float32),
-            first, float(grid.bias_m[b]), fit, pose, weight, self.hypothesis,
+            first, float(grid.bias_m[b]), fit, pose, weight, self.hypothesis, self.section,
         )  # fmt: skip
 
     def _log_twin(self, at: tuple[int, int], shifts: Sequence[int], p: LikelihoodParams) -> float:

@@ -43,9 +43,12 @@ class LikelihoodParams:
             recorded realistic missions nearly all low tops were those of partly traced objects.
         contour_sd_m: Standard deviation of a contour's side, besides that of the traces.
         contour_outlier: Probability that the contour covers only a part of the object.
+        trace_outlier: Probability that a trace mixes the contacts of several objects, or of one before and after a
+            motion. Source: ours.
         yaw_sd_rad: Standard deviation of a box contour's direction.
-        temper_outline, temper_width, temper_image, temper_relief: Tempering exponents of outline and height, widths,
-            depth maps and gel images for correlated observations; 0 leaves a part out (`ablation`).
+        temper_outline, temper_contacts, temper_width, temper_image, temper_relief: Tempering exponents of outline and
+            height, of the contacts within the outline, of widths, depth maps and gel images for correlated
+            observations; 0 leaves a part out (`ablation`).
         slope, offset: Calibration: log odds against the background = offset + slope * summed log ratios.
         outline_offset: The same offset for a candidate of which only outline and height were measured.
         prior_absent: Prior probability that the target is none of the candidates.
@@ -87,8 +90,10 @@ class LikelihoodParams:
     height_lower: float = 0.03
     contour_sd_m: float = 1.5e-3
     contour_outlier: float = 0.1
+    trace_outlier: float = 0.03
     yaw_sd_rad: float = math.radians(6.0)
     temper_outline: float = 1.0
+    temper_contacts: float = 0.35
     temper_width: float = 0.5
     temper_image: float = 0.35
     temper_relief: float = 0.35
@@ -114,7 +119,7 @@ class LikelihoodParams:
                 raise ParamError(f"likelihood.{f.name}", v, "odd, so that the grid contains zero")
         for name in (
             "width_outlier", "slip", "image_outlier", "image_alike", "relief_outlier", "height_lower",
-            "contour_outlier", "prior_absent", "twin", "twin_width",
+            "contour_outlier", "trace_outlier", "prior_absent", "twin", "twin_width",
         ):  # fmt: skip
             if not 0 < getattr(self, name) < 1:
                 raise ParamError(f"likelihood.{name}", getattr(self, name), "between 0 and 1")

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from scipy.special import log_ndtr
 
+from glotouch_bt.perception.recognition.likelihood.contacts import SectionFit
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.model import SENSING_M, TargetModel, hand_axes, size_variance_m2
 from glotouch_bt.perception.touch import Candidate
@@ -91,20 +92,41 @@ def contour_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams)
 
 
 def shift_prior(
-    model: TargetModel, candidate: Candidate, turn_rad: float, shift_m: Array, p: LikelihoodParams
-) -> Array:
-    """Return the log prior (72, nd) of the shift: the contour's centre agrees with the model's traces."""
-    traced = model.outline.of(candidate.contour.kind)
-    x, _ = hand_axes(model.phi_rad + turn_rad)
-    off = shift_m[None, :] - (x @ traced.centre_m)[:, None]
-    weight = np.exp(-0.5 * off**2 / (p.shift_sd_m**2 + traced.centre_sd_m**2)) + 1e-9
+    model: TargetModel, candidate: Candidate, fit: SectionFit | None, yaw_rad: float, phi_rad: Array, shift_m: Array,
+    p: LikelihoodParams,
+) -> Array:  # fmt: skip
+    """Return the log prior (72, nd) of the shift: contacts and section agree, or else the contours' centres.
+
+    Args:
+        model, candidate: The target, and what may be it.
+        fit: The candidate's contacts in the target's section, if they are compared with it.
+        yaw_rad: Yaw of the hand in K.
+        phi_rad: (72,) yaws of the hand relative to the target.
+        shift_m: (nd,) shifts.
+        p: Parameters.
+    """
+    if fit is not None:
+        x, _ = hand_axes(np.asarray(yaw_rad))
+        expected = (np.asarray(candidate.contour.centre_K_m) - fit.middle_K_m(yaw_rad - phi_rad, p)) @ x
+        variance = p.slide_sd_m**2
+    else:
+        traced = model.outline.of(candidate.contour.kind)
+        expected = hand_axes(phi_rad)[0] @ traced.centre_m
+        variance = p.shift_sd_m**2 + traced.centre_sd_m**2
+    off = shift_m[None, :] - expected[:, None]
+    weight = np.exp(-0.5 * off**2 / variance) + 1e-9
     weight /= weight.sum(axis=1, keepdims=True)
     return np.asarray(np.log(0.9 * weight + 0.1 / len(shift_m)))
 
 
-def yaw_prior(model: TargetModel, candidate: Candidate, first_rad: float, p: LikelihoodParams) -> Array:
-    """Return the log prior (72,) of the relative yaw of a hand at `first_rad`: a box is aligned with the model."""
+def yaw_prior(
+    model: TargetModel, candidate: Candidate, fit: SectionFit | None, first_rad: float, p: LikelihoodParams
+) -> Array:
+    """Return the log prior (72,) of the relative yaw of a hand at `first_rad`: that of the contacts in the section,
+    or else a box is aligned with the model."""
     n = len(model.phi_rad)
+    if fit is not None:
+        return np.asarray(np.log(fit.yaw_weight(first_rad - model.phi_rad, p)))
     contour, o = candidate.contour, model.outline.as_box
     if contour.kind != "box":
         return np.full(n, -math.log(n))

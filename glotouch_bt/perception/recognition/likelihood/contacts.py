@@ -1,0 +1,198 @@
+"""Likelihood of a candidate's probe contacts: the target's section in an unknown pose, against any outline.
+
+Any outline is the mixture of shape families that the contacts are fitted with (`perception.touch.outline`). Both
+likelihoods are densities of the same data: the ball's centres and the bearings of the reactions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.perception.recognition.model import TIP_RADIUS_M, Section, TargetModel, section_of
+from glotouch_bt.perception.touch import Candidate, Contact
+from glotouch_bt.perception.touch.outline import infer_outline_from_contacts, wrapped
+from glotouch_bt.robot import Array
+
+SCATTER_M = (0.5e-3, 1.0e-3, 2.0e-3)
+"""Standard deviations of a contact from the target's section, with equal prior probability: objects are pushed by
+contacts. Source: 0.3 to 1.7 mm on the objects of 13 missions (`lying_five`, realistic)."""
+NORMAL_SD_RAD = 0.25
+"""Standard deviation of the reaction's bearing about the section's normal: friction turns it. Source: the same
+missions, 0.14 to 0.4 rad."""
+OUTLIER = 0.05
+"""Probability of a contact with something else, or before an unseen motion. Source: ours."""
+OUTLIER_RANGE_M = 0.040
+"""Range of the uniform density of such contacts. Source: ours; half an object."""
+CENTRE_SD_M = 0.025
+"""Prior standard deviation of the section's middle about that of the contacts, as of other outlines."""
+STARTS = 72
+"""Number of yaws from which the pose is fitted."""
+SIFT_STEP, SIFTED = 2, 14
+"""Step of the descent after which only this number of the best starts continue."""
+STEPS = 8
+"""Steps of the descent."""
+YAW_WEIGHT = np.array([0.0, 0.0, 1.0])
+"""Inverse variances that bound the volume of the yaws of a round section."""
+LONGEST_STEP = np.array([0.008, 0.008, 0.1])
+"""Longest step of the descent, m and rad."""
+MIN_CONTACTS = 3
+"""Least number of contacts that are compared with a section."""
+BALL_TOLERANCE_M = 1e-3
+"""Contacts are of the ball if its centre is at its radius from the contact point within this."""
+SAME_RAD = math.radians(3.0)
+"""Fitted poses closer than this are one."""
+_GENERIC_NORMAL_SD_RAD = 0.20
+_MEMORY = 256
+
+
+@dataclass(frozen=True, eq=False)
+class SectionFit:
+    """Comparison of a candidate's contacts with a section.
+
+    Attributes:
+        log_ratio: log p(contacts | section) - log p(contacts | any outline), nats.
+        log_weight: (m,) log posterior probabilities of the fitted poses.
+        pose_K: (m, 3) their x, y of the section's origin in K, m, and yaw, rad.
+        yaw_sd_rad: (m,) standard deviation of the yaw.
+    """
+
+    log_ratio: float
+    log_weight: Array
+    pose_K: Array
+    yaw_sd_rad: Array
+
+    def term(self, p: LikelihoodParams) -> float:
+        """Return the tempered log ratio; a trace that went wrong says nothing."""
+        return math.log((1.0 - p.trace_outlier) * math.exp(p.temper_contacts * self.log_ratio) + p.trace_outlier)
+
+    def yaw_weight(self, yaw_rad: Array, p: LikelihoodParams) -> Array:
+        """Return the probabilities (n,) of yaws (n,) in K, which sum to 1."""
+        near = self._log_near(yaw_rad, p)
+        weight = np.exp(near - near.max()).sum(axis=1)
+        return np.asarray(0.9 * weight / weight.sum() + 0.1 / len(yaw_rad))
+
+    def middle_K_m(self, yaw_rad: Array, p: LikelihoodParams) -> Array:
+        """Return the place (n, 2) of the section's origin for yaws (n,) in K: that of the nearest likely pose."""
+        return self.pose_K[self._log_near(yaw_rad, p).argmax(axis=1), :2]
+
+    def _log_near(self, yaw_rad: Array, p: LikelihoodParams) -> Array:
+        """Return the log weight (n, m) of each fitted pose at yaws (n,): a closure may have turned the object."""
+        off = wrapped(yaw_rad[:, None] - self.pose_K[:, 2]) / np.hypot(self.yaw_sd_rad, p.yaw_sd_rad)
+        return np.asarray(p.temper_contacts * self.log_weight - 0.5 * off**2)
+
+
+_fits: deque[tuple[Section, tuple[Contact, ...], SectionFit]] = deque(maxlen=_MEMORY)
+_outlines: deque[tuple[tuple[Contact, ...], float]] = deque(maxlen=_MEMORY)
+
+
+def are_of_ball(contacts: tuple[Contact, ...]) -> bool:
+    """Return True if there are enough contacts, and the ball made them, not another section."""
+    if len(contacts) < MIN_CONTACTS:
+        return False
+    off = [math.dist(c.tip_K_m[:2], c.point_K_m) - TIP_RADIUS_M for c in contacts]
+    return abs(float(np.median(off))) < BALL_TOLERANCE_M
+
+
+def section_fit(model: TargetModel, candidate: Candidate) -> SectionFit | None:
+    """Compare a candidate's contacts with a target; None without a mesh, or without enough contacts of the ball."""
+    if model.mesh is None or not are_of_ball(candidate.contacts):
+        return None
+    section = section_of(model.mesh, model.centre_m)
+    return None if section is None else fit_section(section, candidate.contacts)
+
+
+def fit_section(section: Section, contacts: tuple[Contact, ...]) -> SectionFit:
+    """Compare contacts of the ball with a section; the newest results are kept."""
+    for known, of, fit in _fits:
+        if known is section and of is contacts:
+            return fit
+    fit = _fit(section, contacts)
+    _fits.appendleft((section, contacts, fit))
+    return fit
+
+
+def _log_any_outline(contacts: tuple[Contact, ...]) -> float:
+    """Return the log likelihood of contacts with one object of any outline, or, rarely, with anything."""
+    for of, value in _outlines:
+        if of is contacts:
+            return value
+    outline = infer_outline_from_contacts(contacts, TIP_RADIUS_M).log_evidence
+    anything = math.log(OUTLIER) + len(contacts) * math.log(_GENERIC_NORMAL_SD_RAD / OUTLIER_RANGE_M)
+    value = float(np.logaddexp(outline, anything))
+    _outlines.appendleft((contacts, value))
+    return value
+
+
+def _fit(section: Section, contacts: tuple[Contact, ...]) -> SectionFit:
+    tips = np.array([c.tip_K_m[:2] for c in contacts])
+    reaction = np.array([c.reaction_K[:2] for c in contacts])
+    bearing = np.arctan2(reaction[:, 1], reaction[:, 0])
+    middle = 0.5 * (tips.min(axis=0) + tips.max(axis=0))
+    pose = np.column_stack([np.tile(middle, (STARTS, 1)), np.arange(STARTS) * (2 * np.pi / STARTS)])
+    prior = np.array([1.0, 1.0, 0.0]) / CENTRE_SD_M**2
+    centre = np.array([*middle, 0.0])
+    sd = SCATTER_M[1]
+
+    def loss_at(pose: Array) -> tuple[Array, Array, Array]:
+        off, turned, rows = _residuals(section, tips, bearing, pose)
+        loss = -_log_density(off, turned, sd).sum(axis=1) + 0.5 * ((pose - centre) ** 2 * prior).sum(axis=1)
+        return loss, off, rows
+
+    loss, off, rows = loss_at(pose)
+    damping = np.full(STARTS, 1e-2)
+    for step in range(STEPS):
+        if step == SIFT_STEP:
+            best = np.argsort(loss, kind="stable")[:SIFTED]
+            pose, loss, off, rows, damping = pose[best], loss[best], off[best], rows[best], damping[best]
+        weight = 1.0 / (1.0 + (off / sd) ** 2 / 9.0) / sd**2
+        hessian = np.einsum("nk,nki,nkj->nij", weight, rows, rows) + np.diag(prior + 1e-3)
+        gradient = np.einsum("nk,nki,nk->ni", weight, rows, off) + (pose - centre) * prior
+        damped = hessian * (1.0 + damping[:, None, None] * np.eye(3))
+        move = np.clip(-np.linalg.solve(damped, gradient[..., None])[..., 0], -LONGEST_STEP, LONGEST_STEP)
+        trial_loss, trial_off, trial_rows = loss_at(pose + move)
+        better = trial_loss < loss
+        pose[better] += move[better]
+        loss[better], off[better], rows[better] = trial_loss[better], trial_off[better], trial_rows[better]
+        damping *= np.where(better, 0.3, 5.0)
+    kept: list[int] = []
+    for i in np.argsort(loss, kind="stable"):
+        if loss[i] > loss.min() + 12.0:
+            break
+        if all(abs(wrapped(pose[i, 2] - pose[j, 2])) > SAME_RAD for j in kept):
+            kept.append(int(i))
+    off, turned, rows = _residuals(section, tips, bearing, pose[kept])
+    logs, yaw_sd = [], np.zeros(len(kept))
+    for sd in SCATTER_M:
+        weight = 1.0 / (1.0 + (off / sd) ** 2 / 9.0) / sd**2
+        hessian = np.einsum("nk,nki,nkj->nij", weight, rows, rows) + np.diag(prior + YAW_WEIGHT)
+        density = _log_density(off, turned, sd).sum(axis=1) - 0.5 * ((pose[kept] - centre) ** 2 * prior).sum(axis=1)
+        volume = -0.5 * np.linalg.slogdet(hessian)[1] - 2 * math.log(CENTRE_SD_M) - 0.5 * math.log(2 * math.pi)
+        logs.append(density + volume - math.log(len(SCATTER_M)))
+        yaw_sd = np.maximum(yaw_sd, np.sqrt(np.linalg.inv(hessian)[:, 2, 2]))
+    by_pose = np.logaddexp.reduce(np.array(logs), axis=0)
+    total = float(np.logaddexp.reduce(by_pose))
+    return SectionFit(total - _log_any_outline(contacts), by_pose - total, pose[kept], yaw_sd)
+
+
+def _residuals(section: Section, tips: Array, bearing: Array, pose: Array) -> tuple[Array, Array, Array]:
+    """Return distances (s, k), bearings less those of the normals (s, k), and derivatives (s, k, 3) of the distances,
+    for poses (s, 3)."""
+    c, s = np.cos(pose[:, 2:]), np.sin(pose[:, 2:])
+    dx, dy = tips[:, 0] - pose[:, :1], tips[:, 1] - pose[:, 1:2]
+    x, y = c * dx + s * dy, c * dy - s * dx
+    distance, slope = section.at(np.stack([x, y], axis=-1))
+    gx, gy = slope[..., 0], slope[..., 1]
+    rows = np.stack([s * gy - c * gx, -(s * gx + c * gy), gx * y - gy * x], axis=-1)
+    return distance, wrapped(bearing - np.arctan2(gy, gx) - pose[:, 2:]), rows
+
+
+def _log_density(off_m: Array, turned_rad: Array, sd_m: float) -> Array:
+    """Return log densities (s, k) of contacts, without the constants that other outlines leave out as well."""
+    near = np.exp(-0.5 * ((off_m / sd_m) ** 2 + (turned_rad / NORMAL_SD_RAD) ** 2))
+    near *= (1 - OUTLIER) / sd_m * (_GENERIC_NORMAL_SD_RAD / NORMAL_SD_RAD)
+    return np.log(near + OUTLIER * _GENERIC_NORMAL_SD_RAD / OUTLIER_RANGE_M)

@@ -1,0 +1,106 @@
+"""Section of a solid as the held probe feels it: the signed distance of the ball's centre from contact.
+
+The ball's centre moves in the sensing plane. It touches where the ball, or the shaft above it, first meets the solid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import scipy
+
+from glotouch_bt.perception.recognition.model.outline import SENSING_M, SHAFT_M, SHAFT_RADIUS_M, TIP_RADIUS_M
+from glotouch_bt.robot import Array
+from glotouch_bt.robot.scene import ByDigest, Mesh
+
+CELL_M = 0.0015
+"""Edge of a cell of the table; interpolation errs by 0.05 mm on an edge that the ball of 6 mm goes round."""
+MARGIN_M = 0.020
+"""Distance by which the table extends beyond the solid."""
+POINTS = 30_000
+"""Number of points on the surface. They are 0.8 mm apart on an object of 60 mm, which errs by 0.02 mm."""
+MIN_SLOPE = 0.3
+"""Least slope by which a distance in space is divided to get that in the plane."""
+MIN_POINTS = 30
+"""Least number of points beside the ball or the shaft for a solid to be felt."""
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Table of the distance of the ball's centre from contact, about a point of the solid.
+
+    Attributes:
+        table: (n * n, 3) distance in the sensing plane, m, negative where the ball would be inside, and its gradient.
+        n: Number of cells along x and y.
+    """
+
+    table: Array
+    n: int
+
+    def at(self, points_m: Array) -> tuple[Array, Array]:
+        """Return distances (..), m, and gradients (.., 2) at points (.., 2), by bilinear interpolation."""
+        at = np.clip(points_m / CELL_M + 0.5 * (self.n - 1), 0.0, self.n - 1 - 1e-6)
+        whole = at.astype(np.int64)
+        x, y = np.moveaxis(at - whole, -1, 0)[..., None]
+        corner = whole[..., 0] * self.n + whole[..., 1]
+        near = self.table[corner] * (1 - y) + self.table[corner + 1] * y
+        far = self.table[corner + self.n] * (1 - y) + self.table[corner + self.n + 1] * y
+        found = near * (1 - x) + far * x
+        return found[..., 0], found[..., 1:]
+
+
+def section_of(mesh: Mesh, centre_m: Array) -> Section | None:
+    """Return the section of a solid about a point (2,) of its frame; None if it is too low to be felt."""
+    return _section(ByDigest(mesh), tuple(np.asarray(centre_m).tolist()))
+
+
+@lru_cache(maxsize=64)
+def _section(key: ByDigest, centre_m: tuple[float, float]) -> Section | None:
+    points = _surface(key.mesh)
+    points[:, :2] -= centre_m
+    points[:, 2] -= SENSING_M
+    ball, shaft = np.abs(points[:, 2]) < TIP_RADIUS_M, (points[:, 2] > 0.0) & (points[:, 2] < SHAFT_M)
+    if (ball | shaft).sum() < MIN_POINTS:
+        return None
+    half = int(np.ceil((np.abs(points[ball | shaft, :2]).max() + MARGIN_M) / CELL_M))
+    grid = np.arange(-half, half + 1) * CELL_M
+    x, y = np.meshgrid(grid, grid, indexing="ij")
+    at = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    distance: Array = np.full(x.size, np.inf)
+    if ball.any():
+        distance = scipy.spatial.cKDTree(points[ball]).query(at)[0] - TIP_RADIUS_M
+    if shaft.any():
+        tree = scipy.spatial.cKDTree(points[shaft, :2])
+        distance = np.minimum(distance, tree.query(at[:, :2])[0] - SHAFT_RADIUS_M)
+    return _table(distance.reshape(x.shape))
+
+
+def _table(distance_m: Array) -> Section:
+    """Return the table of distances (n, n) in space from the solid's surface, which are positive inside as well."""
+    label, _ = scipy.ndimage.label(distance_m > 0.0)
+    outside = label == label[0, 0]
+    depth = scipy.ndimage.distance_transform_edt(~outside) * CELL_M
+    slope = _slope(distance_m)
+    steep = np.maximum(np.linalg.norm(slope, axis=-1), MIN_SLOPE)
+    planar = np.where(outside | (depth < TIP_RADIUS_M), distance_m / steep, 0.0)
+    planar = np.where(outside, planar, np.minimum(planar, CELL_M - depth))
+    return Section(np.concatenate([planar[..., None], _slope(planar)], axis=-1).reshape(-1, 3), len(planar))
+
+
+def _slope(values: Array) -> Array:
+    """Return the gradient (n, n, 2) of values (n, n) at the cells."""
+    along_x, along_y = (np.gradient(values, CELL_M, axis=axis) for axis in (0, 1))
+    return np.stack([along_x, along_y], axis=-1)
+
+
+def _surface(mesh: Mesh) -> Array:
+    """Return points (POINTS, 3) spread evenly over the surface, the same ones each time."""
+    rng = np.random.default_rng(0)
+    a, b, c = np.moveaxis(mesh.vertices_m[mesh.faces], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    chosen = np.searchsorted(np.cumsum(area) / area.sum(), (np.arange(POINTS) + rng.random(POINTS)) / POINTS)
+    chosen = np.minimum(chosen, len(area) - 1)
+    u, v = np.sqrt(rng.random(POINTS))[:, None], rng.random(POINTS)[:, None]
+    return np.asarray((1 - u) * a[chosen] + u * (1 - v) * b[chosen] + u * v * c[chosen])
