@@ -70,7 +70,7 @@ def _section(key: ByDigest, centre_m: tuple[float, float]) -> Section | None:
     at = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     distance: Array = np.full(x.size, np.inf)
     if ball.any():
-        distance = scipy.spatial.cKDTree(points[ball]).query(at)[0] - TIP_RADIUS_M
+        distance = np.asarray(scipy.spatial.cKDTree(points[ball]).query(at)[0]) - TIP_RADIUS_M
     if shaft.any():
         tree = scipy.spatial.cKDTree(points[shaft, :2])
         distance = np.minimum(distance, tree.query(at[:, :2])[0] - SHAFT_RADIUS_M)
