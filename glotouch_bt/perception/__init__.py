@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from glotouch_bt.lazy import lazy_door
 
 if TYPE_CHECKING:
+    from glotouch_bt.perception.fragments import joined
     from glotouch_bt.perception.model_cache import target_model
     from glotouch_bt.perception.reach import TooLow, model_for, pads_of, too_wide
     from glotouch_bt.perception.sides import model_with_sides
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 __getattr__ = lazy_door(
     __name__,
+    joined="fragments",
     target_model="model_cache",
     model_with_sides="sides",
     **dict.fromkeys(("TooLow", "model_for", "pads_of", "too_wide"), "reach"),

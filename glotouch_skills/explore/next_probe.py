@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.perception import recognition
-from glotouch_bt.perception.recognition import PARTS, ProbeOption, ProbeTouch, excluded, next_probe_touch
+from glotouch_bt.perception import joined, recognition
+from glotouch_bt.perception.recognition import PARTS, ProbeOption, ProbeTouch, TargetModel, excluded, next_probe_touch
 from glotouch_bt.perception.search import distinct
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD, Array
@@ -68,28 +68,40 @@ class NextProbe(Skill):
         yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
         new, before = self.measured, self.before or ()
         candidates = tuple(new if new is not None and new.index == c.index else c for c in self.known)
-        candidates = self._distinct(candidates)
+        model = self._target()
+        candidates = self._distinct(candidates, model)
         tried = {(t.candidate, t.part) for t in before}
         left = [ProbeTouch(c.index, part) for c in candidates for part in PARTS if (c.index, part) not in tried]
         self.postponed = 0
-        touch = self._by_target(candidates, left) if self.params.target else _worst_known(candidates, left)
+        touch = _worst_known(candidates, left) if model is None else self._by_target(model, candidates, left)
         self.candidates, self.measured_enough = candidates, touch is None
         self.unmeasured = len(_indices(left))
         self.next_part = "" if touch is None else touch.part
         self.probed = before if touch is None else (*before, touch)
         self.candidate = next(c for c in candidates if touch is None or c.index == touch.candidate)
 
-    def _distinct(self, candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
-        """Return the candidates without those that turned out to be the same body as another one."""
+    def _target(self) -> TargetModel | None:
+        if not self.params.target:
+            return None
+        return find_target(self.params.target, self.context.world.objects, self.context.arm.description.gripper).model
+
+    def _distinct(self, candidates: tuple[Candidate, ...], model: TargetModel | None) -> tuple[Candidate, ...]:
+        """Return the candidates without those that turned out to be the same body as another one, or a part of the
+        target with another one."""
         felt = frozenset(t.candidate.index for t in self.felt or () if t.layers)
         kept = distinct(candidates, felt)
         for index in sorted({c.index for c in candidates} - {c.index for c in kept}):
             self.event("note", text=f"candidate {index} is left out: it is the same body as another one")
-        return kept
+        if model is None:
+            return kept
+        whole = joined(model, kept, felt)
+        for index in sorted({c.index for c in kept} - {c.index for c in whole}):
+            self.event("note", text=f"candidate {index} is left out: with another one it is one body, the target's")
+        return whole
 
-    def _by_target(self, candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:
-        gripper = self.context.arm.description.gripper
-        model = find_target(self.params.target, self.context.world.objects, gripper).model
+    def _by_target(
+        self, model: TargetModel, candidates: tuple[Candidate, ...], left: list[ProbeTouch]
+    ) -> ProbeTouch | None:
         felt = {t.candidate.index: t.sequences for t in self.felt or ()}
         touchsets = tuple(TouchSet(c, felt.get(c.index, ())) for c in candidates)
         belief = recognition.infer_belief(model, touchsets)

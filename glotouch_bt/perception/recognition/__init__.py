@@ -10,7 +10,7 @@ from glotouch_bt.lazy import lazy_door
 from glotouch_bt.perception.recognition.decision import PARTS, Closure, Fit, Gates, Match, ProbeTouch, Ranking, rank
 
 if TYPE_CHECKING:
-    from glotouch_bt.perception.recognition.likelihood import Belief, expected_gain, infer_belief
+    from glotouch_bt.perception.recognition.likelihood import Belief, expected_gain, gain_of_one, infer_belief
     from glotouch_bt.perception.recognition.matchers import MATCHERS, Matcher
     from glotouch_bt.perception.recognition.model import PadSpec, TargetModel
     from glotouch_bt.perception.recognition.schedule import (
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __getattr__ = lazy_door(
     __name__,
-    **dict.fromkeys(("Belief", "infer_belief", "expected_gain"), "likelihood"),
+    **dict.fromkeys(("Belief", "infer_belief", "expected_gain", "gain_of_one"), "likelihood"),
     **dict.fromkeys(("MATCHERS", "Matcher"), "matchers"),
     **dict.fromkeys(("PadSpec", "TargetModel"), "model"),
     **dict.fromkeys(("FeltClosure", "TouchedObject", "encounter_of", "touched_model"), "touched"),

@@ -1,6 +1,6 @@
 """Pure planners of tactile exploration: search for objects, outline tracing and height measurement."""
 
-from glotouch_bt.perception.search.bodies import distinct
+from glotouch_bt.perception.search.bodies import BESIDE_M, distinct, outline_of
 from glotouch_bt.perception.search.candidates import (
     HALF_QUALITY_SD_M,
     admit,
@@ -8,6 +8,7 @@ from glotouch_bt.perception.search.candidates import (
     lost_among,
     of_another,
     part_of,
+    quality,
     refined,
 )
 from glotouch_bt.perception.search.exploring import trace_bodies

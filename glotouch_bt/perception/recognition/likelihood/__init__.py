@@ -7,4 +7,5 @@ from glotouch_bt.perception.recognition.likelihood.belief import (
     infer_belief,
     ranked,
 )
+from glotouch_bt.perception.recognition.likelihood.contacts import gain_of_one
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.model import TIP_RADIUS_M, Section, TargetModel, section_of
+from glotouch_bt.perception.recognition.model import LEVELS_M, TIP_RADIUS_M, Section, TargetModel, section_of
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.perception.touch.outline import infer_outline_from_contacts, wrapped
 from glotouch_bt.robot import Array
@@ -34,8 +35,14 @@ STARTS = 72
 """Number of yaws from which the pose is fitted."""
 SIFT_STEP, SIFTED = 2, 14
 """Step of the descent after which only this number of the best starts continue."""
+LEVEL_PRIOR = np.log([0.5, 0.25, 0.25])
+"""Log prior probabilities of the heights of the sensing plane, `LEVELS_M`. Source: ours."""
 STEPS = 8
 """Steps of the descent."""
+PRIOR_WEIGHT = np.array([1.0, 1.0, 0.0]) / CENTRE_SD_M**2
+"""Inverse variances of the pose's prior."""
+UNLIKELY_NATS = 12.0
+"""Poses less likely than the best by more than this are left out."""
 YAW_WEIGHT = np.array([0.0, 0.0, 1.0])
 """Inverse variances that bound the volume of the yaws of a round section."""
 LONGEST_STEP = np.array([0.008, 0.008, 0.1])
@@ -48,6 +55,8 @@ SAME_RAD = math.radians(3.0)
 """Fitted poses closer than this are one."""
 _GENERIC_NORMAL_SD_RAD = 0.20
 _MEMORY = 256
+
+Levels = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +115,24 @@ def section_fit(model: TargetModel, candidate: Candidate) -> SectionFit | None:
     return None if section is None else fit_section(section, candidate.contacts)
 
 
+def gain_of_one(model: TargetModel, a: Candidate, b: Candidate) -> float:
+    """Return the gain of log evidence, nats, if the contacts of two candidates are all with the target.
+
+    The alternative is two objects, of which one may be the target. It is -inf if the contacts are not compared with the
+    target.
+    """
+    both = replace(a, contacts=tuple(sorted((*a.contacts, *b.contacts), key=lambda c: c.stamp_s)))
+
+    def by_target(candidate: Candidate) -> float:
+        fits = [(h, section_fit(h.model, candidate)) for h in model.hypotheses]
+        logs = [np.log(h.weight) + f.log_ratio for h, f in fits if f is not None]
+        return float(np.logaddexp.reduce(logs)) + _log_any_outline(candidate.contacts) if logs else -np.inf
+
+    apart = [_log_any_outline(c.contacts) for c in (a, b)]
+    two = max(sum(apart), by_target(a) + apart[1], apart[0] + by_target(b))
+    return by_target(both) - two
+
+
 def fit_section(section: Section, contacts: tuple[Contact, ...]) -> SectionFit:
     """Compare contacts of the ball with a section; the newest results are kept."""
     for known, of, fit in _fits:
@@ -129,66 +156,80 @@ def _log_any_outline(contacts: tuple[Contact, ...]) -> float:
 
 
 def _fit(section: Section, contacts: tuple[Contact, ...]) -> SectionFit:
-    tips = np.array([c.tip_K_m[:2] for c in contacts])
-    reaction = np.array([c.reaction_K[:2] for c in contacts])
-    bearing = np.arctan2(reaction[:, 1], reaction[:, 0])
-    middle = 0.5 * (tips.min(axis=0) + tips.max(axis=0))
-    pose = np.column_stack([np.tile(middle, (STARTS, 1)), np.arange(STARTS) * (2 * np.pi / STARTS)])
-    prior = np.array([1.0, 1.0, 0.0]) / CENTRE_SD_M**2
-    centre = np.array([*middle, 0.0])
+    seen = _Seen.of(contacts)
+    pose = np.column_stack([np.tile(seen.middle, (STARTS, 1)), np.arange(STARTS) * (2 * np.pi / STARTS)])
+    level = np.zeros(STARTS, dtype=np.int64)
     sd = SCATTER_M[1]
-
-    def loss_at(pose: Array) -> tuple[Array, Array, Array]:
-        off, turned, rows = _residuals(section, tips, bearing, pose)
-        loss = -_log_density(off, turned, sd).sum(axis=1) + 0.5 * ((pose - centre) ** 2 * prior).sum(axis=1)
-        return loss, off, rows
-
-    loss, off, rows = loss_at(pose)
+    loss, off, rows = seen.loss(section, level, pose, sd)
     damping = np.full(STARTS, 1e-2)
     for step in range(STEPS):
         if step == SIFT_STEP:
-            best = np.argsort(loss, kind="stable")[:SIFTED]
-            pose, loss, off, rows, damping = pose[best], loss[best], off[best], rows[best], damping[best]
+            best = np.argsort(loss, kind="stable")[:SIFTED].repeat(len(LEVELS_M))
+            pose, damping, level = pose[best], damping[best], np.tile(np.arange(len(LEVELS_M)), SIFTED)
+            loss, off, rows = seen.loss(section, level, pose, sd)
         weight = 1.0 / (1.0 + (off / sd) ** 2 / 9.0) / sd**2
-        hessian = np.einsum("nk,nki,nkj->nij", weight, rows, rows) + np.diag(prior + 1e-3)
-        gradient = np.einsum("nk,nki,nk->ni", weight, rows, off) + (pose - centre) * prior
+        hessian = np.einsum("nk,nki,nkj->nij", weight, rows, rows) + np.diag(PRIOR_WEIGHT + 1e-3)
+        gradient = np.einsum("nk,nki,nk->ni", weight, rows, off) + (pose - seen.centre) * PRIOR_WEIGHT
         damped = hessian * (1.0 + damping[:, None, None] * np.eye(3))
         move = np.clip(-np.linalg.solve(damped, gradient[..., None])[..., 0], -LONGEST_STEP, LONGEST_STEP)
-        trial_loss, trial_off, trial_rows = loss_at(pose + move)
+        trial_loss, trial_off, trial_rows = seen.loss(section, level, pose + move, sd)
         better = trial_loss < loss
         pose[better] += move[better]
         loss[better], off[better], rows[better] = trial_loss[better], trial_off[better], trial_rows[better]
         damping *= np.where(better, 0.3, 5.0)
     kept: list[int] = []
     for i in np.argsort(loss, kind="stable"):
-        if loss[i] > loss.min() + 12.0:
+        if loss[i] > loss.min() + UNLIKELY_NATS:
             break
-        if all(abs(wrapped(pose[i, 2] - pose[j, 2])) > SAME_RAD for j in kept):
+        if all(level[i] != level[j] or abs(wrapped(pose[i, 2] - pose[j, 2])) > SAME_RAD for j in kept):
             kept.append(int(i))
-    off, turned, rows = _residuals(section, tips, bearing, pose[kept])
-    logs, yaw_sd = [], np.zeros(len(kept))
-    for sd in SCATTER_M:
-        weight = 1.0 / (1.0 + (off / sd) ** 2 / 9.0) / sd**2
-        hessian = np.einsum("nk,nki,nkj->nij", weight, rows, rows) + np.diag(prior + YAW_WEIGHT)
-        density = _log_density(off, turned, sd).sum(axis=1) - 0.5 * ((pose[kept] - centre) ** 2 * prior).sum(axis=1)
-        volume = -0.5 * np.linalg.slogdet(hessian)[1] - 2 * math.log(CENTRE_SD_M) - 0.5 * math.log(2 * math.pi)
-        logs.append(density + volume - math.log(len(SCATTER_M)))
-        yaw_sd = np.maximum(yaw_sd, np.sqrt(np.linalg.inv(hessian)[:, 2, 2]))
-    by_pose = np.logaddexp.reduce(np.array(logs), axis=0)
+    pose, level = pose[kept], level[kept]
+    logs, yaw_sd = zip(*(seen.evidence(section, level, pose, sd) for sd in SCATTER_M), strict=True)
+    by_pose = np.logaddexp.reduce(np.array(logs), axis=0) + LEVEL_PRIOR[level]
     total = float(np.logaddexp.reduce(by_pose))
-    return SectionFit(total - _log_any_outline(contacts), by_pose - total, pose[kept], yaw_sd)
+    return SectionFit(total - _log_any_outline(contacts), by_pose - total, pose, np.max(yaw_sd, axis=0))
 
 
-def _residuals(section: Section, tips: Array, bearing: Array, pose: Array) -> tuple[Array, Array, Array]:
-    """Return distances (s, k), bearings less those of the normals (s, k), and derivatives (s, k, 3) of the distances,
-    for poses (s, 3)."""
-    c, s = np.cos(pose[:, 2:]), np.sin(pose[:, 2:])
-    dx, dy = tips[:, 0] - pose[:, :1], tips[:, 1] - pose[:, 1:2]
-    x, y = c * dx + s * dy, c * dy - s * dx
-    distance, slope = section.at(np.stack([x, y], axis=-1))
-    gx, gy = slope[..., 0], slope[..., 1]
-    rows = np.stack([s * gy - c * gx, -(s * gx + c * gy), gx * y - gy * x], axis=-1)
-    return distance, wrapped(bearing - np.arctan2(gy, gx) - pose[:, 2:]), rows
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Contacts as they are compared: ball centres (k, 2), bearings (k,) of the reactions, and the prior's mean."""
+
+    tips: Array
+    bearing: Array
+    middle: Array
+    centre: Array
+
+    @classmethod
+    def of(cls, contacts: tuple[Contact, ...]) -> _Seen:
+        tips = np.array([c.tip_K_m[:2] for c in contacts])
+        reaction = np.array([c.reaction_K[:2] for c in contacts])
+        middle = 0.5 * (tips.min(axis=0) + tips.max(axis=0))
+        return cls(tips, np.arctan2(reaction[:, 1], reaction[:, 0]), middle, np.array([*middle, 0.0]))
+
+    def loss(self, section: Section, level: Levels, pose: Array, sd_m: float) -> tuple[Array, Array, Array]:
+        """Return negative log densities (s,) for poses (s, 3), distances (s, k), and their derivatives (s, k, 3)."""
+        off, turned, rows = self._residuals(section, level, pose)
+        prior = 0.5 * ((pose - self.centre) ** 2 * PRIOR_WEIGHT).sum(axis=1)
+        return prior - _log_density(off, turned, sd_m).sum(axis=1), off, rows
+
+    def evidence(self, section: Section, level: Levels, pose: Array, sd_m: float) -> tuple[Array, Array]:
+        """Return the log evidence (s,) about each pose (s, 3), by Laplace's method, and the yaw's deviations (s,)."""
+        loss, off, rows = self.loss(section, level, pose, sd_m)
+        weight = 1.0 / (1.0 + (off / sd_m) ** 2 / 9.0) / sd_m**2
+        hessian = np.einsum("nk,nki,nkj->nij", weight, rows, rows) + np.diag(PRIOR_WEIGHT + YAW_WEIGHT)
+        volume = -0.5 * np.linalg.slogdet(hessian)[1] - 2 * math.log(CENTRE_SD_M) - 0.5 * math.log(2 * math.pi)
+        return volume - loss - math.log(len(SCATTER_M)), np.sqrt(np.linalg.inv(hessian)[:, 2, 2])
+
+    def _residuals(self, section: Section, level: Levels, pose: Array) -> tuple[Array, Array, Array]:
+        """Return distances (s, k), bearings less those of the normals (s, k), and derivatives (s, k, 3) of the
+        distances, for poses (s, 3)."""
+        c, s = np.cos(pose[:, 2:]), np.sin(pose[:, 2:])
+        dx, dy = self.tips[:, 0] - pose[:, :1], self.tips[:, 1] - pose[:, 1:2]
+        x, y = c * dx + s * dy, c * dy - s * dx
+        distance, slope = section.at(np.stack([x, y], axis=-1), level)
+        gx, gy = slope[..., 0], slope[..., 1]
+        rows = np.stack([s * gy - c * gx, -(s * gx + c * gy), gx * y - gy * x], axis=-1)
+        return distance, wrapped(self.bearing - np.arctan2(gy, gx) - pose[:, 2:]), rows
 
 
 def _log_density(off_m: Array, turned_rad: Array, sd_m: float) -> Array:

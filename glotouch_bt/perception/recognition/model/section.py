@@ -1,6 +1,7 @@
-"""Section of a solid as the held probe feels it: the signed distance of the ball's centre from contact.
+"""Sections of a solid as the held probe feels it: the signed distance of the ball's centre from contact.
 
 The ball's centre moves in the sensing plane. It touches where the ball, or the shaft above it, first meets the solid.
+The plane's height above the solid's base is not exactly known: the floor is tilted, and the object leans.
 """
 
 from __future__ import annotations
@@ -9,18 +10,21 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from glotouch_bt.perception.recognition.model.outline import SENSING_M, SHAFT_M, SHAFT_RADIUS_M, TIP_RADIUS_M
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import ByDigest, Mesh
 
-CELL_M = 0.0015
+CELL_M = 0.002
 """Edge of a cell of the table; interpolation errs by 0.05 mm on an edge that the ball of 6 mm goes round."""
 MARGIN_M = 0.020
 """Distance by which the table extends beyond the solid."""
-POINTS = 30_000
+POINTS = 20_000
 """Number of points on the surface. They are 0.8 mm apart on an object of 60 mm, which errs by 0.02 mm."""
+LEVELS_M = (SENSING_M, SENSING_M - 0.003, SENSING_M + 0.003)
+"""Heights of the sensing plane above the solid's base, the nominal one first."""
 MIN_SLOPE = 0.3
 """Least slope by which a distance in space is divided to get that in the plane."""
 MIN_POINTS = 30
@@ -29,22 +33,27 @@ MIN_POINTS = 30
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Table of the distance of the ball's centre from contact, about a point of the solid.
+    """Tables of the distance of the ball's centre from contact, about a point of the solid.
 
     Attributes:
-        table: (n * n, 3) distance in the sensing plane, m, negative where the ball would be inside, and its gradient.
+        table: (levels * n * n, 3) distance in the plane, m, negative where the ball would be inside, and its gradient.
         n: Number of cells along x and y.
     """
 
     table: Array
     n: int
 
-    def at(self, points_m: Array) -> tuple[Array, Array]:
-        """Return distances (..), m, and gradients (.., 2) at points (.., 2), by bilinear interpolation."""
+    def at(self, points_m: Array, level: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+        """Return distances (s, k), m, and gradients (s, k, 2), by bilinear interpolation.
+
+        Args:
+            points_m: (s, k, 2) places of the ball's centre.
+            level: (s,) indices of `LEVELS_M`.
+        """
         at = np.clip(points_m / CELL_M + 0.5 * (self.n - 1), 0.0, self.n - 1 - 1e-6)
         whole = at.astype(np.int64)
         x, y = np.moveaxis(at - whole, -1, 0)[..., None]
-        corner = whole[..., 0] * self.n + whole[..., 1]
+        corner = (level[:, None] * self.n + whole[..., 0]) * self.n + whole[..., 1]
         near = self.table[corner] * (1 - y) + self.table[corner + 1] * y
         far = self.table[corner + self.n] * (1 - y) + self.table[corner + self.n + 1] * y
         found = near * (1 - x) + far * x
@@ -60,25 +69,33 @@ def section_of(mesh: Mesh, centre_m: Array) -> Section | None:
 def _section(key: ByDigest, centre_m: tuple[float, float]) -> Section | None:
     points = _surface(key.mesh)
     points[:, :2] -= centre_m
-    points[:, 2] -= SENSING_M
-    ball, shaft = np.abs(points[:, 2]) < TIP_RADIUS_M, (points[:, 2] > 0.0) & (points[:, 2] < SHAFT_M)
-    if (ball | shaft).sum() < MIN_POINTS:
+    felt = np.abs(points[:, 2] - SENSING_M) < TIP_RADIUS_M
+    if (felt | (points[:, 2] > SENSING_M)).sum() < MIN_POINTS:
         return None
-    half = int(np.ceil((np.abs(points[ball | shaft, :2]).max() + MARGIN_M) / CELL_M))
+    half = int(np.ceil((np.abs(points[:, :2]).max() + MARGIN_M) / CELL_M))
     grid = np.arange(-half, half + 1) * CELL_M
     x, y = np.meshgrid(grid, grid, indexing="ij")
-    at = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    distance: Array = np.full(x.size, np.inf)
+    places = np.column_stack([x.ravel(), y.ravel()])
+    tables = [_table(_distance(points - [0.0, 0.0, z], places).reshape(x.shape)) for z in LEVELS_M]
+    return Section(np.concatenate(tables), len(grid))
+
+
+def _distance(points: Array, places: Array) -> Array:
+    """Return the distances (n,) in space between a probe at places (n, 2) and the surface's points (m, 3), whose z is
+    that above the sensing plane."""
+    ball, shaft = np.abs(points[:, 2]) < TIP_RADIUS_M, (points[:, 2] > 0.0) & (points[:, 2] < SHAFT_M)
+    distance = np.full(len(places), MARGIN_M)
     if ball.any():
-        distance = np.asarray(scipy.spatial.cKDTree(points[ball]).query(at)[0]) - TIP_RADIUS_M
+        centre = np.column_stack([places, np.zeros(len(places))])
+        distance = np.minimum(distance, scipy.spatial.cKDTree(points[ball]).query(centre)[0] - TIP_RADIUS_M)
     if shaft.any():
         tree = scipy.spatial.cKDTree(points[shaft, :2])
-        distance = np.minimum(distance, tree.query(at[:, :2])[0] - SHAFT_RADIUS_M)
-    return _table(distance.reshape(x.shape))
+        distance = np.minimum(distance, tree.query(places)[0] - SHAFT_RADIUS_M)
+    return np.asarray(distance)
 
 
-def _table(distance_m: Array) -> Section:
-    """Return the table of distances (n, n) in space from the solid's surface, which are positive inside as well."""
+def _table(distance_m: Array) -> Array:
+    """Return the table (n * n, 3) of distances (n, n) in space from the surface, which are positive inside as well."""
     label, _ = scipy.ndimage.label(distance_m > 0.0)
     outside = label == label[0, 0]
     depth = scipy.ndimage.distance_transform_edt(~outside) * CELL_M
@@ -86,7 +103,7 @@ def _table(distance_m: Array) -> Section:
     steep = np.maximum(np.linalg.norm(slope, axis=-1), MIN_SLOPE)
     planar = np.where(outside | (depth < TIP_RADIUS_M), distance_m / steep, 0.0)
     planar = np.where(outside, planar, np.minimum(planar, CELL_M - depth))
-    return Section(np.concatenate([planar[..., None], _slope(planar)], axis=-1).reshape(-1, 3), len(planar))
+    return np.asarray(np.concatenate([planar[..., None], _slope(planar)], axis=-1).reshape(-1, 3))
 
 
 def _slope(values: Array) -> Array:
