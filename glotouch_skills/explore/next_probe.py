@@ -35,8 +35,9 @@ class NextProbe(Skill):
     """Choose the measurement that is expected to tell most per second about which candidate is the target.
 
     Repeat it, and make what it chose with `refine_outline` or `touch_top`, until `measured_enough`. A candidate that
-    the target's STL excludes already is not measured. Without a target all are, the least certain outline first. A
-    candidate that turned out to be the same body as another one is left out of `candidates`.
+    the target's STL excludes already is not measured. Without a target all are, the least certain outline first.
+
+    Two candidates that are one body become one in `candidates`: they overlap, or they are parts of the target.
 
     SUCCESS: `candidate` and `next_part` are chosen, or `measured_enough` is true and `next_part` is empty.
     """
