@@ -45,6 +45,8 @@ ROUNDING_M = 1e-5
 """Largest distance of a table's value beyond the mesh, by rounding to 32 bit."""
 MAPPED_DTYPES = ("<f4",)
 """Types of the tables."""
+MAX_SECTION = 10.0
+"""Largest number in the table of a section: distances are below a metre, slopes mostly below 1."""
 MAX_MAPPED = 32
 """Maximum number of models mapped in this process."""
 _mapped: OrderedDict[Path, TargetModel] = OrderedDict()
@@ -174,7 +176,8 @@ def _is_of(model: TargetModel, mesh: Mesh, pad: PadSpec) -> bool:
     largest_m = axes.radius_m + ROUNDING_M
     tables = all(np.abs(t[np.isfinite(t)]).max(initial=0.0) <= largest_m for t in (reach, fine))
     images = np.isfinite(model.images_by_place).all()
-    return bool(tables and images and _is_within(model, 4.0 * largest_m + TIP_RADIUS_M))
+    section = model.section is None or np.abs(model.section.table).max() < MAX_SECTION  # NaN is not
+    return bool(tables and images and section and _is_within(model, 4.0 * largest_m + TIP_RADIUS_M))
 
 
 def _is_within(model: TargetModel, largest_m: float) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.model import LEVELS_M, TIP_RADIUS_M, Section, TargetModel, section_of
+from glotouch_bt.perception.recognition.model import LEVELS_M, TIP_RADIUS_M, Section, TargetModel
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.perception.touch.outline import infer_outline_from_contacts, wrapped
 from glotouch_bt.robot import Array
@@ -109,10 +109,9 @@ def are_of_ball(contacts: tuple[Contact, ...]) -> bool:
 
 def section_fit(model: TargetModel, candidate: Candidate) -> SectionFit | None:
     """Compare a candidate's contacts with a target; None without a mesh, or without enough contacts of the ball."""
-    if model.mesh is None or not are_of_ball(candidate.contacts):
+    if model.section is None or not are_of_ball(candidate.contacts):
         return None
-    section = section_of(model.mesh, model.centre_m)
-    return None if section is None else fit_section(section, candidate.contacts)
+    return fit_section(model.section, candidate.contacts)
 
 
 def gain_of_one(model: TargetModel, a: Candidate, b: Candidate) -> float:

@@ -10,10 +10,11 @@ import numpy as np
 
 from glotouch_bt.perception.recognition.model.outline import KindFit, Outline
 from glotouch_bt.perception.recognition.model.pads import Array32, PadSpec
+from glotouch_bt.perception.recognition.model.section import LEVELS_M, Section
 from glotouch_bt.perception.recognition.model.target import TargetModel
 from glotouch_bt.robot import ParamError
 
-VERSION = 5
+VERSION = 6
 """Version of the tables; increase it when a table's meaning or computation changes."""
 _NUMBERS = ("height_m", "rho", "rho_sd", "normal_dispersion", "anisotropy")
 
@@ -37,6 +38,8 @@ def to_parts(model: TargetModel) -> tuple[dict[str, Any], dict[str, Array32]]:
         "fine_m": model.fine_m,
         "images": model.images_by_place,
     }
+    if model.section is not None:
+        arrays["section"] = model.section.table
     return facts, arrays
 
 
@@ -57,6 +60,9 @@ def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32
         for key, s in expected.items():
             if arrays[key].shape != s:
                 raise ParamError(f"table {key}", arrays[key].shape, f"{s}")
+        section = arrays.get("section")
+        if section is not None and (section.ndim != 4 or section.shape[::3] != (len(LEVELS_M), 3)):
+            raise ParamError("table section", section.shape, f"({len(LEVELS_M)}, n, n, 3)")
         outline, *components = (
             Outline(_fit(o["as_round"]), _fit(o["as_box"]), float(o["p_box"])) for o in facts["outlines"]
         )
@@ -65,6 +71,7 @@ def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32
             name=name, digest=str(facts["digest"]), pad=pad, phi_rad=phi, l_m=l, z_m=z, reach_m=arrays["reach_m"],
             fine_m=arrays["fine_m"], outline=outline, components=tuple(components),
             centre_m=np.array(facts["centre_m"], dtype=np.float64), tops_m=np.array(facts["tops_m"], dtype=np.float64),
+            section=None if section is None else Section(section),
             sides=(), certainty=None, mesh=None, **numbers, _lazy={"images": arrays["images"]},
         )  # fmt: skip
     except (KeyError, TypeError, ValueError) as e:

@@ -7,15 +7,15 @@ The plane's height above the solid's base is not exactly known: the floor is til
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 import scipy
 
 from glotouch_bt.perception.recognition.model.outline import SENSING_M, SHAFT_M, SHAFT_RADIUS_M, TIP_RADIUS_M
+from glotouch_bt.perception.recognition.model.pads import Array32
 from glotouch_bt.robot import Array
-from glotouch_bt.robot.scene import ByDigest, Mesh
+from glotouch_bt.robot.scene import Mesh
 
 CELL_M = 0.002
 """Edge of a cell of the table; interpolation errs by 0.05 mm on an edge that the ball of 6 mm goes round."""
@@ -27,6 +27,8 @@ LEVELS_M = (SENSING_M, SENSING_M - 0.003, SENSING_M + 0.003)
 """Heights of the sensing plane above the solid's base, the nominal one first."""
 MIN_SLOPE = 0.3
 """Least slope by which a distance in space is divided to get that in the plane."""
+MAX_SLOPE = 2.0
+"""Largest slope along an axis; the distance jumps where the nearest surface is another one."""
 MIN_POINTS = 30
 """Least number of points beside the ball or the shaft for a solid to be felt."""
 
@@ -36,12 +38,11 @@ class Section:
     """Tables of the distance of the ball's centre from contact, about a point of the solid.
 
     Attributes:
-        table: (levels * n * n, 3) distance in the plane, m, negative where the ball would be inside, and its gradient.
-        n: Number of cells along x and y.
+        table: (levels, n, n, 3) at each of `LEVELS_M`, x and y: the distance in the plane, m, negative where the ball
+            would be inside, and its gradient.
     """
 
-    table: Array
-    n: int
+    table: Array32
 
     def at(self, points_m: Array, level: npt.NDArray[np.int64]) -> tuple[Array, Array]:
         """Return distances (s, k), m, and gradients (s, k, 2), by bilinear interpolation.
@@ -50,24 +51,20 @@ class Section:
             points_m: (s, k, 2) places of the ball's centre.
             level: (s,) indices of `LEVELS_M`.
         """
-        at = np.clip(points_m / CELL_M + 0.5 * (self.n - 1), 0.0, self.n - 1 - 1e-6)
+        n, flat = self.table.shape[1], self.table.reshape(-1, 3)
+        at = np.clip(points_m / CELL_M + 0.5 * (n - 1), 0.0, n - 1 - 1e-6)
         whole = at.astype(np.int64)
         x, y = np.moveaxis(at - whole, -1, 0)[..., None]
-        corner = (level[:, None] * self.n + whole[..., 0]) * self.n + whole[..., 1]
-        near = self.table[corner] * (1 - y) + self.table[corner + 1] * y
-        far = self.table[corner + self.n] * (1 - y) + self.table[corner + self.n + 1] * y
+        corner = (level[:, None] * n + whole[..., 0]) * n + whole[..., 1]
+        near = flat[corner] * (1 - y) + flat[corner + 1] * y
+        far = flat[corner + n] * (1 - y) + flat[corner + n + 1] * y
         found = near * (1 - x) + far * x
         return found[..., 0], found[..., 1:]
 
 
 def section_of(mesh: Mesh, centre_m: Array) -> Section | None:
     """Return the section of a solid about a point (2,) of its frame; None if it is too low to be felt."""
-    return _section(ByDigest(mesh), tuple(np.asarray(centre_m).tolist()))
-
-
-@lru_cache(maxsize=64)
-def _section(key: ByDigest, centre_m: tuple[float, float]) -> Section | None:
-    points = _surface(key.mesh)
+    points = _surface(mesh)
     points[:, :2] -= centre_m
     felt = np.abs(points[:, 2] - SENSING_M) < TIP_RADIUS_M
     if (felt | (points[:, 2] > SENSING_M)).sum() < MIN_POINTS:
@@ -77,7 +74,9 @@ def _section(key: ByDigest, centre_m: tuple[float, float]) -> Section | None:
     x, y = np.meshgrid(grid, grid, indexing="ij")
     places = np.column_stack([x.ravel(), y.ravel()])
     tables = [_table(_distance(points - [0.0, 0.0, z], places).reshape(x.shape)) for z in LEVELS_M]
-    return Section(np.concatenate(tables), len(grid))
+    table = np.array(tables, dtype=np.float32)
+    table.setflags(write=False)
+    return Section(table)
 
 
 def _distance(points: Array, places: Array) -> Array:
@@ -95,21 +94,21 @@ def _distance(points: Array, places: Array) -> Array:
 
 
 def _table(distance_m: Array) -> Array:
-    """Return the table (n * n, 3) of distances (n, n) in space from the surface, which are positive inside as well."""
+    """Return the table (n, n, 3) of distances (n, n) in space from the surface, which are positive inside as well."""
     label, _ = scipy.ndimage.label(distance_m > 0.0)
     outside = label == label[0, 0]
     depth = scipy.ndimage.distance_transform_edt(~outside) * CELL_M
     slope = _slope(distance_m)
     steep = np.maximum(np.linalg.norm(slope, axis=-1), MIN_SLOPE)
     planar = np.where(outside | (depth < TIP_RADIUS_M), distance_m / steep, 0.0)
-    planar = np.where(outside, planar, np.minimum(planar, CELL_M - depth))
-    return np.asarray(np.concatenate([planar[..., None], _slope(planar)], axis=-1).reshape(-1, 3))
+    planar = np.clip(np.where(outside, planar, np.minimum(planar, CELL_M - depth)), -MARGIN_M, MARGIN_M)
+    return np.concatenate([planar[..., None], _slope(planar)], axis=-1)
 
 
 def _slope(values: Array) -> Array:
     """Return the gradient (n, n, 2) of values (n, n) at the cells."""
     along_x, along_y = (np.gradient(values, CELL_M, axis=axis) for axis in (0, 1))
-    return np.stack([along_x, along_y], axis=-1)
+    return np.clip(np.stack([along_x, along_y], axis=-1), -MAX_SLOPE, MAX_SLOPE)
 
 
 def _surface(mesh: Mesh) -> Array:

@@ -15,6 +15,7 @@ from glotouch_bt.perception.recognition.model.components import component_outlin
 from glotouch_bt.perception.recognition.model.outline import Outline, minimum_rectangle, traced_outline
 from glotouch_bt.perception.recognition.model.pads import FINE, Array32, PadSpec, image_feature
 from glotouch_bt.perception.recognition.model.raster import mirrored, side_images, window_max
+from glotouch_bt.perception.recognition.model.section import Section, section_of
 from glotouch_bt.perception.recognition.model.simulated_touches import pooled_images, simulated_statistics
 from glotouch_bt.perception.recognition.model.tops import tops_within
 from glotouch_bt.robot import Array, ParamError
@@ -89,6 +90,7 @@ class TargetModel:
         anisotropy: 1 - short / long of the footprint's minimum-area rectangle (the paper's a_M).
         sides: The sides on which the object may stand, each with a model of its own; empty if only as in its file.
         certainty: How well the tables are known; None if they follow from a mesh. Without a mesh, `fine_m` is empty.
+        section: Where the probe's ball can be beside it, about `centre_m`; None if only touch is known of it.
         mesh: The mesh, for predictions that no table holds; None if the target is known only by touch.
     """
 
@@ -111,6 +113,7 @@ class TargetModel:
     components: tuple[Outline, ...] = ()
     sides: tuple[TargetHypothesis, ...] = ()
     certainty: Certainty | None = None
+    section: Section | None = None
     mesh: Mesh | None = None
     _lazy: dict[str, Array32] = field(default_factory=dict, repr=False)
 
@@ -287,5 +290,5 @@ def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
     return TargetModel(
         mesh.name, mesh.digest, pad, axes.phi_rad, axes.l_m, axes.z_m, reach, fine, outline, axes.centre_m,
         axes.height_m, tops_within(solid, axes.radius_m), rho, rho_sd, dispersion, axes.anisotropy,
-        component_outlines(solid), mesh=mesh,
+        component_outlines(solid), section=section_of(mesh, axes.centre_m), mesh=mesh,
     )  # fmt: skip
