@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.model import LEVELS_M, TIP_RADIUS_M, Section, TargetModel
+from glotouch_bt.perception.recognition.model import LEVELS_M, TIP_RADIUS_M, TargetModel, TargetSection
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.perception.touch.outline import infer_outline_from_contacts, wrapped
 from glotouch_bt.robot import Array
@@ -95,7 +95,7 @@ class SectionFit:
         return np.asarray(p.temper_contacts * self.log_weight - 0.5 * off**2)
 
 
-_fits: deque[tuple[Section, tuple[Contact, ...], SectionFit]] = deque(maxlen=_MEMORY)
+_fits: deque[tuple[TargetSection, tuple[Contact, ...], SectionFit]] = deque(maxlen=_MEMORY)
 _outlines: deque[tuple[tuple[Contact, ...], float]] = deque(maxlen=_MEMORY)
 
 
@@ -132,7 +132,7 @@ def gain_of_one(model: TargetModel, a: Candidate, b: Candidate) -> float:
     return by_target(both) - two
 
 
-def fit_section(section: Section, contacts: tuple[Contact, ...]) -> SectionFit:
+def fit_section(section: TargetSection, contacts: tuple[Contact, ...]) -> SectionFit:
     """Compare contacts of the ball with a section; the newest results are kept."""
     for known, of, fit in _fits:
         if known is section and of is contacts:
@@ -154,7 +154,7 @@ def _log_any_outline(contacts: tuple[Contact, ...]) -> float:
     return value
 
 
-def _fit(section: Section, contacts: tuple[Contact, ...]) -> SectionFit:
+def _fit(section: TargetSection, contacts: tuple[Contact, ...]) -> SectionFit:
     seen = _Seen.of(contacts)
     pose = np.column_stack([np.tile(seen.middle, (STARTS, 1)), np.arange(STARTS) * (2 * np.pi / STARTS)])
     level = np.zeros(STARTS, dtype=np.int64)
@@ -205,13 +205,13 @@ class _Seen:
         middle = 0.5 * (tips.min(axis=0) + tips.max(axis=0))
         return cls(tips, np.arctan2(reaction[:, 1], reaction[:, 0]), middle, np.array([*middle, 0.0]))
 
-    def loss(self, section: Section, level: Levels, pose: Array, sd_m: float) -> tuple[Array, Array, Array]:
+    def loss(self, section: TargetSection, level: Levels, pose: Array, sd_m: float) -> tuple[Array, Array, Array]:
         """Return negative log densities (s,) for poses (s, 3), distances (s, k), and their derivatives (s, k, 3)."""
         off, turned, rows = self._residuals(section, level, pose)
         prior = 0.5 * ((pose - self.centre) ** 2 * PRIOR_WEIGHT).sum(axis=1)
         return prior - _log_density(off, turned, sd_m).sum(axis=1), off, rows
 
-    def evidence(self, section: Section, level: Levels, pose: Array, sd_m: float) -> tuple[Array, Array]:
+    def evidence(self, section: TargetSection, level: Levels, pose: Array, sd_m: float) -> tuple[Array, Array]:
         """Return the log evidence (s,) about each pose (s, 3), by Laplace's method, and the yaw's deviations (s,)."""
         loss, off, rows = self.loss(section, level, pose, sd_m)
         weight = 1.0 / (1.0 + (off / sd_m) ** 2 / 9.0) / sd_m**2
@@ -219,7 +219,7 @@ class _Seen:
         volume = -0.5 * np.linalg.slogdet(hessian)[1] - 2 * math.log(CENTRE_SD_M) - 0.5 * math.log(2 * math.pi)
         return volume - loss - math.log(len(SCATTER_M)), np.sqrt(np.linalg.inv(hessian)[:, 2, 2])
 
-    def _residuals(self, section: Section, level: Levels, pose: Array) -> tuple[Array, Array, Array]:
+    def _residuals(self, section: TargetSection, level: Levels, pose: Array) -> tuple[Array, Array, Array]:
         """Return distances (s, k), bearings less those of the normals (s, k), and derivatives (s, k, 3) of the
         distances, for poses (s, 3)."""
         c, s = np.cos(pose[:, 2:]), np.sin(pose[:, 2:])

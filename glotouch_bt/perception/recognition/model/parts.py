@@ -10,7 +10,7 @@ import numpy as np
 
 from glotouch_bt.perception.recognition.model.outline import KindFit, Outline
 from glotouch_bt.perception.recognition.model.pads import Array32, PadSpec
-from glotouch_bt.perception.recognition.model.section import LEVELS_M, Section
+from glotouch_bt.perception.recognition.model.section import LEVELS_M, TargetSection
 from glotouch_bt.perception.recognition.model.target import TargetModel
 from glotouch_bt.robot import ParamError
 
@@ -71,7 +71,7 @@ def from_parts(name: str, facts: Mapping[str, Any], arrays: Mapping[str, Array32
             name=name, digest=str(facts["digest"]), pad=pad, phi_rad=phi, l_m=l, z_m=z, reach_m=arrays["reach_m"],
             fine_m=arrays["fine_m"], outline=outline, components=tuple(components),
             centre_m=np.array(facts["centre_m"], dtype=np.float64), tops_m=np.array(facts["tops_m"], dtype=np.float64),
-            section=None if section is None else Section(section),
+            section=None if section is None else TargetSection(section),
             sides=(), certainty=None, mesh=None, **numbers, _lazy={"images": arrays["images"]},
         )  # fmt: skip
     except (KeyError, TypeError, ValueError) as e:

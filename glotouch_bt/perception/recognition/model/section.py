@@ -34,7 +34,7 @@ MIN_POINTS = 30
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class TargetSection:
     """Tables of the distance of the ball's centre from contact, about a point of the solid.
 
     Attributes:
@@ -62,7 +62,7 @@ class Section:
         return found[..., 0], found[..., 1:]
 
 
-def section_of(mesh: Mesh, centre_m: Array) -> Section | None:
+def section_of(mesh: Mesh, centre_m: Array) -> TargetSection | None:
     """Return the section of a solid about a point (2,) of its frame; None if it is too low to be felt."""
     points = _surface(mesh)
     points[:, :2] -= centre_m
@@ -76,7 +76,7 @@ def section_of(mesh: Mesh, centre_m: Array) -> Section | None:
     tables = [_table(_distance(points - [0.0, 0.0, z], places).reshape(x.shape)) for z in LEVELS_M]
     table = np.array(tables, dtype=np.float32)
     table.setflags(write=False)
-    return Section(table)
+    return TargetSection(table)
 
 
 def _distance(points: Array, places: Array) -> Array:
@@ -108,7 +108,8 @@ def _table(distance_m: Array) -> Array:
 def _slope(values: Array) -> Array:
     """Return the gradient (n, n, 2) of values (n, n) at the cells."""
     along_x, along_y = (np.gradient(values, CELL_M, axis=axis) for axis in (0, 1))
-    return np.clip(np.stack([along_x, along_y], axis=-1), -MAX_SLOPE, MAX_SLOPE)
+    slope: Array = np.stack([along_x, along_y], axis=-1)
+    return slope.clip(-MAX_SLOPE, MAX_SLOPE)
 
 
 def _surface(mesh: Mesh) -> Array:

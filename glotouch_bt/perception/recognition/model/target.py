@@ -15,7 +15,7 @@ from glotouch_bt.perception.recognition.model.components import component_outlin
 from glotouch_bt.perception.recognition.model.outline import Outline, minimum_rectangle, traced_outline
 from glotouch_bt.perception.recognition.model.pads import FINE, Array32, PadSpec, image_feature
 from glotouch_bt.perception.recognition.model.raster import mirrored, side_images, window_max
-from glotouch_bt.perception.recognition.model.section import Section, section_of
+from glotouch_bt.perception.recognition.model.section import TargetSection, section_of
 from glotouch_bt.perception.recognition.model.simulated_touches import pooled_images, simulated_statistics
 from glotouch_bt.perception.recognition.model.tops import tops_within
 from glotouch_bt.robot import Array, ParamError
@@ -113,7 +113,7 @@ class TargetModel:
     components: tuple[Outline, ...] = ()
     sides: tuple[TargetHypothesis, ...] = ()
     certainty: Certainty | None = None
-    section: Section | None = None
+    section: TargetSection | None = None
     mesh: Mesh | None = None
     _lazy: dict[str, Array32] = field(default_factory=dict, repr=False)
 
