@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from glotouch_backends.rizon4 import RIZON4_XENSE
-from glotouch_bt.robot import Array, MotionRefused, Pose, World
+from glotouch_bt.robot import Array, MotionRefused, Pose, TactileFrame, World
 from glotouch_bt.robot.fake import FakeRobot
 from glotouch_skills.common.hand.compliant_close import (
     FOLLOW_FORCE_N,
@@ -18,6 +18,7 @@ from glotouch_skills.common.hand.compliant_close import (
     MAX_CLOSING_FORCE_N,
     MAX_HAND_FORCE_N,
     MAX_REST_FORCE_N,
+    MAX_TWIST_NM,
     RAMP_N_S,
     close_compliantly,
     release,
@@ -160,3 +161,29 @@ def test_a_foot_under_a_fingertip_frees_the_hand_when_it_lets_go(bench: Any, wor
     assert b.arm.aperture_m == pytest.approx(0.07, abs=1e-3)
     assert max(robot.felt_N) < held_N + 10.0
     assert float(b.arm.pose_B_P.position_m[2]) > z, "the way it was pushed"
+
+
+class Askew(FakeRobot):
+    """An object that the gels feel at two places, `apart_m` from each other along the pads."""
+
+    def __init__(self, apart_m: float) -> None:
+        self.apart_m = apart_m
+        super().__init__(RIZON4_XENSE, grip_width_m=WIDTH_M)
+
+    def _frame(self) -> TactileFrame:
+        rows, cols = RIZON4_XENSE.gripper.pad_shape
+        touched = self._aperture < WIDTH_M + 1e-4
+        shift = 0.5 * self.apart_m / RIZON4_XENSE.gripper.pad_window_m[0] * cols
+        maps = []
+        for side in (1.0, -1.0):
+            near = np.abs(np.arange(cols) + 0.5 - 0.5 * cols - side * shift) < 2.5
+            maps.append(np.tile(np.where(near & touched, 4e-4, 0.0), (rows, 1)))
+        return TactileFrame(self.cycles * self.period_s, *maps)
+
+
+@pytest.mark.parametrize(("apart_m", "most_N"), [(0.0, 30.0), (0.006, 30.0), (0.012, MAX_TWIST_NM / 0.012)])
+def test_an_object_held_askew_is_pressed_less(bench: Any, world: World, apart_m: float, most_N: float) -> None:
+    b = bench().on(world, Askew(apart_m))
+    b.go(close_compliantly(b.arm, SPEED_M_S, 30.0))
+    forces = [c.gripper.force_N for c in b.commands if c.gripper is not None]
+    assert forces[-1] == pytest.approx(most_N, rel=0.15)
