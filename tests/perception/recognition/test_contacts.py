@@ -10,7 +10,7 @@ import pytest
 from glotouch_bt.perception import joined
 from glotouch_bt.perception.recognition import PadSpec, TargetModel, gain_of_one
 from glotouch_bt.perception.recognition.likelihood import LikelihoodParams
-from glotouch_bt.perception.recognition.likelihood.contacts import are_of_ball, section_fit
+from glotouch_bt.perception.recognition.likelihood.contacts import SectionFit, are_of_ball, section_fits
 from glotouch_bt.perception.search import outline_of
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.robot import Array
@@ -54,6 +54,10 @@ def bar() -> TargetModel:
     return TargetModel.from_mesh(box(0.09, 0.04, 0.05), PadSpec())
 
 
+def section_fit(model: TargetModel, of: Candidate) -> SectionFit | None:
+    return section_fits([model], of)[0]
+
+
 @pytest.mark.parametrize("pose", [(0.0, 0.0, 0.0), (0.05, -0.08, 1.1), (-0.1, 0.02, -2.5)])
 def test_the_pose_is_that_of_the_object(bar: TargetModel, pose: tuple[float, float, float]) -> None:
     fit = section_fit(bar, candidate(box_contacts(pose)))
@@ -74,6 +78,18 @@ def test_the_own_section_explains_contacts_and_another_one_does_not(bar: TargetM
     assert own.log_ratio > 0.0 > narrow.log_ratio > round_one.log_ratio
     assert own.term(P) > 0.0
     assert round_one.term(P) == pytest.approx(math.log(P.trace_outlier), abs=0.1)  # a wrong trace says no more
+
+
+def test_sections_compared_together_give_what_each_gives_alone(bar: TargetModel) -> None:
+    models = [
+        bar,
+        TargetModel.from_mesh(cylinder(0.03, 0.05), PadSpec()),
+        TargetModel.from_mesh(box(0.09, 0.055, 0.05), PadSpec()),
+    ]
+    of = candidate(box_contacts((0.02, 0.03, 0.7)))
+    together = section_fits(models, of)
+    alone = [section_fit(m, candidate(of.contacts)) for m in models]
+    assert [f.log_ratio for f in together] == pytest.approx([f.log_ratio for f in alone], abs=1e-6)
 
 
 def test_a_ratio_does_not_depend_on_where_the_object_stands(bar: TargetModel) -> None:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.model import LEVELS_M, TIP_RADIUS_M, TargetModel, TargetSection
+from glotouch_bt.perception.recognition.model import LEVELS_M, TIP_RADIUS_M, SectionTables, TargetModel, TargetSection
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.perception.touch.outline import infer_outline_from_contacts, wrapped
 from glotouch_bt.robot import Array
@@ -56,7 +57,8 @@ SAME_RAD = math.radians(3.0)
 _GENERIC_NORMAL_SD_RAD = 0.20
 _MEMORY = 256
 
-Levels = npt.NDArray[np.int64]
+Indices = npt.NDArray[np.int64]
+Rows = tuple[Indices, Indices]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +97,7 @@ class SectionFit:
         return np.asarray(p.temper_contacts * self.log_weight - 0.5 * off**2)
 
 
-_fits: deque[tuple[TargetSection, tuple[Contact, ...], SectionFit]] = deque(maxlen=_MEMORY)
+_fits: deque[tuple[tuple[TargetSection, ...], tuple[Contact, ...], list[SectionFit]]] = deque(maxlen=_MEMORY)
 _outlines: deque[tuple[tuple[Contact, ...], float]] = deque(maxlen=_MEMORY)
 
 
@@ -107,11 +109,14 @@ def are_of_ball(contacts: tuple[Contact, ...]) -> bool:
     return abs(float(np.median(off))) < BALL_TOLERANCE_M
 
 
-def section_fit(model: TargetModel, candidate: Candidate) -> SectionFit | None:
-    """Compare a candidate's contacts with a target; None without a mesh, or without enough contacts of the ball."""
-    if model.section is None or not are_of_ball(candidate.contacts):
-        return None
-    return fit_section(model.section, candidate.contacts)
+def section_fits(models: Sequence[TargetModel], candidate: Candidate) -> list[SectionFit | None]:
+    """Compare a candidate's contacts with the sections of models; None for one without, or with too few contacts of the
+    ball. The newest results are kept."""
+    sections = tuple(m.section for m in models if m.section is not None)
+    if not sections or not are_of_ball(candidate.contacts):
+        return [None] * len(models)
+    fits = iter(_known_fits(sections, candidate.contacts))
+    return [None if m.section is None else next(fits) for m in models]
 
 
 def gain_of_one(model: TargetModel, a: Candidate, b: Candidate) -> float:
@@ -123,8 +128,8 @@ def gain_of_one(model: TargetModel, a: Candidate, b: Candidate) -> float:
     both = replace(a, contacts=tuple(sorted((*a.contacts, *b.contacts), key=lambda c: c.stamp_s)))
 
     def by_target(candidate: Candidate) -> float:
-        fits = [(h, section_fit(h.model, candidate)) for h in model.hypotheses]
-        logs = [np.log(h.weight) + f.log_ratio for h, f in fits if f is not None]
+        fits = section_fits([h.model for h in model.hypotheses], candidate)
+        logs = [np.log(h.weight) + f.log_ratio for h, f in zip(model.hypotheses, fits, strict=True) if f is not None]
         return float(np.logaddexp.reduce(logs)) + _log_any_outline(candidate.contacts) if logs else -np.inf
 
     apart = [_log_any_outline(c.contacts) for c in (a, b)]
@@ -132,14 +137,13 @@ def gain_of_one(model: TargetModel, a: Candidate, b: Candidate) -> float:
     return by_target(both) - two
 
 
-def fit_section(section: TargetSection, contacts: tuple[Contact, ...]) -> SectionFit:
-    """Compare contacts of the ball with a section; the newest results are kept."""
-    for known, of, fit in _fits:
-        if known is section and of is contacts:
-            return fit
-    fit = _fit(section, contacts)
-    _fits.appendleft((section, contacts, fit))
-    return fit
+def _known_fits(sections: tuple[TargetSection, ...], contacts: tuple[Contact, ...]) -> list[SectionFit]:
+    for known, of, fits in _fits:
+        if of is contacts and len(known) == len(sections) and all(a is b for a, b in zip(known, sections, strict=True)):
+            return fits
+    fits = _fit(sections, contacts)
+    _fits.appendleft((sections, contacts, fits))
+    return fits
 
 
 def _log_any_outline(contacts: tuple[Contact, ...]) -> float:
@@ -154,39 +158,57 @@ def _log_any_outline(contacts: tuple[Contact, ...]) -> float:
     return value
 
 
-def _fit(section: TargetSection, contacts: tuple[Contact, ...]) -> SectionFit:
-    seen = _Seen.of(contacts)
-    pose = np.column_stack([np.tile(seen.middle, (STARTS, 1)), np.arange(STARTS) * (2 * np.pi / STARTS)])
-    level = np.zeros(STARTS, dtype=np.int64)
+def _fit(sections: Sequence[TargetSection], contacts: tuple[Contact, ...]) -> list[SectionFit]:
+    seen, tables, count = _Seen.of(contacts), SectionTables.of(sections), len(sections)
+    which, level = np.arange(count).repeat(STARTS), np.zeros(count * STARTS, dtype=np.int64)
+    start = np.column_stack([np.tile(seen.middle, (STARTS, 1)), np.arange(STARTS) * (2 * np.pi / STARTS)])
+    pose, damping = np.tile(start, (count, 1)), np.full(len(which), 1e-2)
     sd = SCATTER_M[1]
-    loss, off, rows = seen.loss(section, level, pose, sd)
-    damping = np.full(STARTS, 1e-2)
+    rows = tables.rows(which, level)
+    loss, off, slope = seen.loss(tables, rows, pose, sd)
     for step in range(STEPS):
         if step == SIFT_STEP:
-            best = np.argsort(loss, kind="stable")[:SIFTED].repeat(len(LEVELS_M))
-            pose, damping, level = pose[best], damping[best], np.tile(np.arange(len(LEVELS_M)), SIFTED)
-            loss, off, rows = seen.loss(section, level, pose, sd)
+            best = np.argsort(loss.reshape(count, STARTS), axis=1, kind="stable")[:, :SIFTED]
+            best = (best + STARTS * np.arange(count)[:, None]).ravel().repeat(len(LEVELS_M))
+            pose, damping, which = pose[best], damping[best], which[best]
+            level = np.tile(np.arange(len(LEVELS_M)), count * SIFTED)
+            rows = tables.rows(which, level)
+            loss, off, slope = seen.loss(tables, rows, pose, sd)
         weight = 1.0 / (1.0 + (off / sd) ** 2 / 9.0) / sd**2
-        hessian = np.einsum("nk,nki,nkj->nij", weight, rows, rows) + np.diag(PRIOR_WEIGHT + 1e-3)
-        gradient = np.einsum("nk,nki,nk->ni", weight, rows, off) + (pose - seen.centre) * PRIOR_WEIGHT
+        weighed = weight[..., None] * slope
+        hessian = weighed.transpose(0, 2, 1) @ slope + np.diag(PRIOR_WEIGHT + 1e-3)
+        gradient = (weighed * off[..., None]).sum(axis=1) + (pose - seen.centre) * PRIOR_WEIGHT
         damped = hessian * (1.0 + damping[:, None, None] * np.eye(3))
         move = np.clip(-np.linalg.solve(damped, gradient[..., None])[..., 0], -LONGEST_STEP, LONGEST_STEP)
-        trial_loss, trial_off, trial_rows = seen.loss(section, level, pose + move, sd)
+        trial_loss, trial_off, trial_slope = seen.loss(tables, rows, pose + move, sd)
         better = trial_loss < loss
         pose[better] += move[better]
-        loss[better], off[better], rows[better] = trial_loss[better], trial_off[better], trial_rows[better]
+        loss[better], off[better], slope[better] = trial_loss[better], trial_off[better], trial_slope[better]
         damping *= np.where(better, 0.3, 5.0)
-    kept: list[int] = []
-    for i in np.argsort(loss, kind="stable"):
-        if loss[i] > loss.min() + UNLIKELY_NATS:
-            break
-        if all(level[i] != level[j] or abs(wrapped(pose[i, 2] - pose[j, 2])) > SAME_RAD for j in kept):
-            kept.append(int(i))
-    pose, level = pose[kept], level[kept]
-    logs, yaw_sd = zip(*(seen.evidence(section, level, pose, sd) for sd in SCATTER_M), strict=True)
+    kept = [_distinct(np.flatnonzero(which == i), loss, level, pose) for i in range(count)]
+    every = np.concatenate(kept)
+    pose, level, rows = pose[every], level[every], (rows[0][every], rows[1][every])
+    logs, yaw_sd = zip(*(seen.evidence(tables, rows, pose, sd) for sd in SCATTER_M), strict=True)
     by_pose = np.logaddexp.reduce(np.array(logs), axis=0) + LEVEL_PRIOR[level]
-    total = float(np.logaddexp.reduce(by_pose))
-    return SectionFit(total - _log_any_outline(contacts), by_pose - total, pose, np.max(yaw_sd, axis=0))
+    widest, any_outline, ends = np.max(yaw_sd, axis=0), _log_any_outline(contacts), np.cumsum([len(k) for k in kept])
+    fits = []
+    for part in np.split(np.arange(len(every)), ends[:-1]):
+        total = float(np.logaddexp.reduce(by_pose[part]))
+        fits.append(SectionFit(total - any_outline, by_pose[part] - total, pose[part], widest[part]))
+    return fits
+
+
+def _distinct(of: Indices, loss: Array, level: Indices, pose: Array) -> Indices:
+    """Return the likely poses among those of indices `of` that differ from each other, the best first."""
+    order = of[np.argsort(loss[of], kind="stable")]
+    order = order[loss[order] <= loss[order[0]] + UNLIKELY_NATS]
+    apart = np.abs(wrapped(pose[order, 2][:, None] - pose[order, 2])) > SAME_RAD
+    apart |= level[order][:, None] != level[order]
+    kept: list[int] = []
+    for i in range(len(order)):
+        if apart[i, kept].all():
+            kept.append(i)
+    return np.asarray(order[kept])
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,30 +227,29 @@ class _Seen:
         middle = 0.5 * (tips.min(axis=0) + tips.max(axis=0))
         return cls(tips, np.arctan2(reaction[:, 1], reaction[:, 0]), middle, np.array([*middle, 0.0]))
 
-    def loss(self, section: TargetSection, level: Levels, pose: Array, sd_m: float) -> tuple[Array, Array, Array]:
+    def loss(self, tables: SectionTables, rows: Rows, pose: Array, sd_m: float) -> tuple[Array, Array, Array]:
         """Return negative log densities (s,) for poses (s, 3), distances (s, k), and their derivatives (s, k, 3)."""
-        off, turned, rows = self._residuals(section, level, pose)
+        off, turned, slope = self._residuals(tables, rows, pose)
         prior = 0.5 * ((pose - self.centre) ** 2 * PRIOR_WEIGHT).sum(axis=1)
-        return prior - _log_density(off, turned, sd_m).sum(axis=1), off, rows
+        return prior - _log_density(off, turned, sd_m).sum(axis=1), off, slope
 
-    def evidence(self, section: TargetSection, level: Levels, pose: Array, sd_m: float) -> tuple[Array, Array]:
+    def evidence(self, tables: SectionTables, rows: Rows, pose: Array, sd_m: float) -> tuple[Array, Array]:
         """Return the log evidence (s,) about each pose (s, 3), by Laplace's method, and the yaw's deviations (s,)."""
-        loss, off, rows = self.loss(section, level, pose, sd_m)
+        loss, off, slope = self.loss(tables, rows, pose, sd_m)
         weight = 1.0 / (1.0 + (off / sd_m) ** 2 / 9.0) / sd_m**2
-        hessian = np.einsum("nk,nki,nkj->nij", weight, rows, rows) + np.diag(PRIOR_WEIGHT + YAW_WEIGHT)
+        hessian = (weight[..., None] * slope).transpose(0, 2, 1) @ slope + np.diag(PRIOR_WEIGHT + YAW_WEIGHT)
         volume = -0.5 * np.linalg.slogdet(hessian)[1] - 2 * math.log(CENTRE_SD_M) - 0.5 * math.log(2 * math.pi)
         return volume - loss - math.log(len(SCATTER_M)), np.sqrt(np.linalg.inv(hessian)[:, 2, 2])
 
-    def _residuals(self, section: TargetSection, level: Levels, pose: Array) -> tuple[Array, Array, Array]:
+    def _residuals(self, tables: SectionTables, rows: Rows, pose: Array) -> tuple[Array, Array, Array]:
         """Return distances (s, k), bearings less those of the normals (s, k), and derivatives (s, k, 3) of the
         distances, for poses (s, 3)."""
         c, s = np.cos(pose[:, 2:]), np.sin(pose[:, 2:])
         dx, dy = self.tips[:, 0] - pose[:, :1], self.tips[:, 1] - pose[:, 1:2]
         x, y = c * dx + s * dy, c * dy - s * dx
-        distance, slope = section.at(np.stack([x, y], axis=-1), level)
-        gx, gy = slope[..., 0], slope[..., 1]
-        rows = np.stack([s * gy - c * gx, -(s * gx + c * gy), gx * y - gy * x], axis=-1)
-        return distance, wrapped(self.bearing - np.arctan2(gy, gx) - pose[:, 2:]), rows
+        distance, gx, gy = tables.at(x, y, rows)
+        slope = np.stack([s * gy - c * gx, -(s * gx + c * gy), gx * y - gy * x], axis=-1)
+        return distance, wrapped(self.bearing - np.arctan2(gy, gx) - pose[:, 2:]), slope
 
 
 def _log_density(off_m: Array, turned_rad: Array, sd_m: float) -> Array:

@@ -13,7 +13,7 @@ from glotouch_bt.perception.recognition.decision import Fit
 from glotouch_bt.perception.recognition.evidence import Evidence, read_evidence
 from glotouch_bt.perception.recognition.likelihood.background import log_generic_images, log_generic_widths
 from glotouch_bt.perception.recognition.likelihood.bands import Residual, log_banded_twin, residual
-from glotouch_bt.perception.recognition.likelihood.contacts import SectionFit, section_fit
+from glotouch_bt.perception.recognition.likelihood.contacts import SectionFit, section_fits
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.relief import LikelyPose, log_generic_reliefs, relief_ratio
 from glotouch_bt.perception.recognition.likelihood.scalars import (
@@ -126,7 +126,7 @@ def compare(model: TargetModel, reading: TouchSetReading, p: LikelihoodParams) -
     Hypotheses that outline and height make far less likely than the best are left out.
     """
     candidate = reading.touchset.candidate
-    fits = [section_fit(h.model, candidate) for h in model.hypotheses]
+    fits = section_fits([h.model for h in model.hypotheses], candidate)
     terms = [_scalar_terms(h.model, candidate, f, p) for h, f in zip(model.hypotheses, fits, strict=True)]
     cheap = np.array(
         [math.log(h.weight) + p.slope * sum(t.values()) for h, t in zip(model.hypotheses, terms, strict=True)]

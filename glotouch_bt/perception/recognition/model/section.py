@@ -6,6 +6,7 @@ The plane's height above the solid's base is not exactly known: the floor is til
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,8 @@ from glotouch_bt.perception.recognition.model.outline import SENSING_M, SHAFT_M,
 from glotouch_bt.perception.recognition.model.pads import Array32
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
+
+Indices = npt.NDArray[np.int64]
 
 CELL_M = 0.002
 """Edge of a cell of the table; interpolation errs by 0.05 mm on an edge that the ball of 6 mm goes round."""
@@ -44,22 +47,51 @@ class TargetSection:
 
     table: Array32
 
-    def at(self, points_m: Array, level: npt.NDArray[np.int64]) -> tuple[Array, Array]:
-        """Return distances (s, k), m, and gradients (s, k, 2), by bilinear interpolation.
+
+@dataclass(frozen=True, eq=False)
+class SectionTables:
+    """Tables of several sections for a common look-up: one call for all hypotheses of a target.
+
+    Attributes:
+        cells: (3, cells) distances and gradients of all of them, one table after the other.
+        first: (m,) index of the first cell of each section.
+        width: (m,) number of cells along an edge of each.
+    """
+
+    cells: Array32
+    first: Indices
+    width: Indices
+
+    @classmethod
+    def of(cls, sections: Sequence[TargetSection]) -> SectionTables:
+        """Join the tables of sections (m)."""
+        flat = [s.table.reshape(-1, 3).T for s in sections]
+        first = np.cumsum([0, *(f.shape[1] for f in flat[:-1])])
+        return cls(
+            np.ascontiguousarray(np.concatenate(flat, axis=1)), first, np.array([s.table.shape[1] for s in sections])
+        )
+
+    def rows(self, which: Indices, level: Indices) -> tuple[Indices, Indices]:
+        """Return the first cell (s,) and the width (s,) of the tables of sections (s,) at levels (s,)."""
+        width = self.width[which]
+        return self.first[which] + level * width**2, width
+
+    def at(self, x_m: Array, y_m: Array, rows: tuple[Indices, Indices]) -> tuple[Array, Array, Array]:
+        """Return distances (s, k), m, and their gradients along x and y (s, k), by bilinear interpolation.
 
         Args:
-            points_m: (s, k, 2) places of the ball's centre.
-            level: (s,) indices of `LEVELS_M`.
+            x_m, y_m: (s, k) places of the ball's centre.
+            rows: Tables of the rows, of `rows`.
         """
-        n, flat = self.table.shape[1], self.table.reshape(-1, 3)
-        at = np.clip(points_m / CELL_M + 0.5 * (n - 1), 0.0, n - 1 - 1e-6)
-        whole = at.astype(np.int64)
-        x, y = np.moveaxis(at - whole, -1, 0)[..., None]
-        corner = (level[:, None] * n + whole[..., 0]) * n + whole[..., 1]
-        near = flat[corner] * (1 - y) + flat[corner + 1] * y
-        far = flat[corner + n] * (1 - y) + flat[corner + n + 1] * y
-        found = near * (1 - x) + far * x
-        return found[..., 0], found[..., 1:]
+        first, n = rows[0][:, None], rows[1][:, None]
+        x, y = (np.clip(v / CELL_M + 0.5 * (n - 1), 0.0, n - 1 - 1e-6) for v in (x_m, y_m))
+        i, j = x.astype(np.int64), y.astype(np.int64)
+        x, y = x - i, y - j
+        corner = first + i * n + j
+        far = x * y
+        corners = ((corner, 1 - x - y + far), (corner + 1, y - far), (corner + n, x - far), (corner + n + 1, far))
+        distance, along_x, along_y = (sum(channel.take(at) * w for at, w in corners) for channel in self.cells)
+        return distance, along_x, along_y
 
 
 def section_of(mesh: Mesh, centre_m: Array) -> TargetSection | None:

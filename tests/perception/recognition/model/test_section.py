@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from glotouch_bt.perception.recognition.model import LEVELS_M, SENSING_M, section_of
+from glotouch_bt.perception.recognition.model import LEVELS_M, SENSING_M, SectionTables, TargetSection, section_of
 from glotouch_bt.robot import Array
 from tests.perception.recognition.conftest import as_mesh, box, cylinder
 
@@ -17,9 +17,15 @@ NEAR_M = 1.5e-4
 
 
 def distances(mesh, places: list[tuple[float, float]], level: int = 0) -> Array:
-    section = section_of(mesh, np.zeros(2))
+    return look_up(section_of(mesh, np.zeros(2)), places, level)[0]
+
+
+def look_up(section: TargetSection | None, places: list[tuple[float, float]], level: int = 0) -> Array:
+    """Distances and gradients (3, n); another section before it must not matter."""
     assert section is not None
-    return section.at(np.array(places)[None], np.array([level]))[0][0]
+    tables = SectionTables.of([section_of(cylinder(0.02, 0.06), np.zeros(2)), section])
+    x, y = np.array(places).T
+    return np.array(tables.at(x[None], y[None], tables.rows(np.array([1]), np.array([level]))))[:, 0]
 
 
 def test_a_cylinder_is_felt_at_its_radius_and_that_of_the_ball() -> None:
@@ -33,8 +39,8 @@ def test_a_cylinder_is_felt_at_its_radius_and_that_of_the_ball() -> None:
 
 def test_the_gradient_is_the_outward_normal() -> None:
     section = section_of(box(0.06, 0.04, 0.05), np.zeros(2))
-    slope = section.at(np.array([[[0.03 + BALL_M, 0.0], [0.0, -0.02 - BALL_M]]]), np.array([0]))[1][0]
-    np.testing.assert_allclose(slope, [[1.0, 0.0], [0.0, -1.0]], atol=0.05)
+    slope = look_up(section, [(0.03 + BALL_M, 0.0), (0.0, -0.02 - BALL_M)])[1:]
+    np.testing.assert_allclose(slope.T, [[1.0, 0.0], [0.0, -1.0]], atol=0.05)
 
 
 def test_the_shaft_meets_an_overhang_above_the_ball() -> None:
