@@ -42,11 +42,12 @@ MAX_REST_FORCE_N = 3.2
 floor friction (3.1 N for the heaviest of CONDITIONS); a larger force means it is wedged, and pressing harder makes it
 snap. All three closures that passed 30 N were above this limit, the least with 3.3 N. Source: simulation, nominal."""
 MAX_TWIST_NM = 0.25
-"""Largest couple of the jaws on an object that they hold askew: 30 N with contacts 8 mm apart along x_P. A box of 50 mm
-by 40 mm, held by opposite corners 17 mm apart, turned at once when 29 N had built up, and the wrist read 40 N. Source:
-simulation, `test_recovery`, frozen gels; the bound is ours."""
+"""Largest torque about z_P with which the jaws turn an object that the two gels touch at different places along x_P.
+30 N at contacts 8 mm apart reach it. A box of 50 mm by 40 mm was held by opposite corners, 17 mm apart. It
+turned at once when the jaw force had reached 29 N, and the true force on the hand peaked at 40 N. Source: simulation,
+`test_what_frozen_gels_did_not_feel_is_touched_again` at a269b288; the bound is ours."""
 MIN_TWISTING_N = 10.0
-"""Jaws press at least this hard, however far apart the contacts: closures do so, too."""
+"""Jaw force that needs no such bound: squeezes use it on every object. Source: default of `ClosureParams.force_N`."""
 BASELINE_S = 0.05
 """Time for which the force on the free hand is averaged before the jaws move."""
 FOLLOW_SPEED_RATIO = 0.75
@@ -102,7 +103,7 @@ def close_compliantly(
     Args:
         arm: At rest, jaws open, hand pointing down.
         speed_m_s: Rate of the aperture.
-        force_N: Largest force of one jaw; less is used on an object that the gels feel askew, as `MAX_TWIST_NM` allows.
+        force_N: Largest force of one jaw. It is lowered where it would turn the object with more than `MAX_TWIST_NM`.
         tactile: Request depth maps.
         on_observation: Called with every observation.
 
@@ -114,14 +115,14 @@ def close_compliantly(
             gentle jaws rested, or the limit of `_max_N` while pressing. The jaws have opened again.
     """
     arm.felt.forget_near(arm.world.container.pose_B_K.inverse().apply(arm.pose_B_P.position_m))
-    twisting = force_N > MIN_TWISTING_N
-    closing = _Closing(arm, speed_m_s, tactile or twisting, on_observation)
+    may_twist = force_N > MIN_TWISTING_N
+    closing = _Closing(arm, speed_m_s, tactile or may_twist, on_observation)
     with arm.pause_signal.finishing():  # pause only at rest: until then the hand must be able to follow
         yield from closing.measure_free_force()
         state = yield from closing.until_rest([min(GENTLE_FORCE_N, force_N)])
         if force_N > GENTLE_FORCE_N:
             yield from closing.refuse_above(MAX_REST_FORCE_N, closing.rest_force_N)
-            if twisting and (apart_m := closing.contacts_apart_m()) > 0.0:
+            if may_twist and (apart_m := closing.contacts_apart_m()) > 0.0:
                 force_N = max(min(force_N, MAX_TWIST_NM / apart_m), MIN_TWISTING_N)
             steps = int(np.ceil((force_N - GENTLE_FORCE_N) / (RAMP_N_S * arm.period_s) - 1e-9))
             state = yield from closing.until_rest(np.linspace(GENTLE_FORCE_N, force_N, steps + 1)[1:].tolist())
@@ -150,14 +151,14 @@ class _Closing:
         """Return the distance along x_P between the contacts of the two gels; 0 unless both feel the object."""
         if self._felt is None:
             return 0.0
-        rows_cols, width_m = self._felt.left_m.shape, self._arm.description.gripper.pad_window_m[0]
+        columns, width_m = self._felt.left_m.shape[1], self._arm.description.gripper.pad_window_m[0]
         middles = []
         for depth_m, noise_m in zip((self._felt.left_m, self._felt.right_m), pad_noise_m(self._untouched), strict=True):
             touched = patch_statistics(depth_m, noise_m=noise_m).mask
             if not touched.any():
                 return 0.0
             middles.append(float(np.nonzero(touched)[1].mean()))
-        return float(abs(middles[0] - middles[1]) / rows_cols[1] * width_m)
+        return float(abs(middles[0] - middles[1]) / columns * width_m)
 
     @property
     def rest_force_N(self) -> float:

@@ -12,10 +12,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
-from glotouch_bt.perception.recognition.model import LEVELS_M, TIP_RADIUS_M, SectionTables, TargetModel, TargetSection
+from glotouch_bt.perception.recognition.model import (
+    LEVELS_M,
+    TIP_RADIUS_M,
+    Indices,
+    SectionTables,
+    TableAt,
+    TargetModel,
+    TargetSection,
+)
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.perception.touch.outline import infer_outline_from_contacts, wrapped
 from glotouch_bt.robot import Array
@@ -56,9 +63,6 @@ SAME_RAD = math.radians(3.0)
 """Fitted poses closer than this are one."""
 _GENERIC_NORMAL_SD_RAD = 0.20
 _MEMORY = 256
-
-Indices = npt.NDArray[np.int64]
-Rows = tuple[Indices, Indices]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +114,11 @@ def are_of_ball(contacts: tuple[Contact, ...]) -> bool:
 
 
 def section_fits(models: Sequence[TargetModel], candidate: Candidate) -> list[SectionFit | None]:
-    """Compare a candidate's contacts with the sections of models; None for one without, or with too few contacts of the
-    ball. The newest results are kept."""
+    """Compare a candidate's contacts with the section of each model.
+
+    A fit is None if the model has no section. All are None if the ball made too few contacts. The newest results are
+    kept.
+    """
     sections = tuple(m.section for m in models if m.section is not None)
     if not sections or not are_of_ball(candidate.contacts):
         return [None] * len(models)
@@ -159,36 +166,40 @@ def _log_any_outline(contacts: tuple[Contact, ...]) -> float:
 
 
 def _fit(sections: Sequence[TargetSection], contacts: tuple[Contact, ...]) -> list[SectionFit]:
+    """Fit poses to the contacts by damped Gauss-Newton steps from all yaws, for all sections at once.
+
+    After `SIFT_STEP` steps only the best starts of each section go on, at every height of the sensing plane.
+    """
     seen, tables, count = _Seen.of(contacts), SectionTables.of(sections), len(sections)
     which, level = np.arange(count).repeat(STARTS), np.zeros(count * STARTS, dtype=np.int64)
     start = np.column_stack([np.tile(seen.middle, (STARTS, 1)), np.arange(STARTS) * (2 * np.pi / STARTS)])
     pose, damping = np.tile(start, (count, 1)), np.full(len(which), 1e-2)
     sd = SCATTER_M[1]
-    rows = tables.rows(which, level)
-    loss, off, slope = seen.loss(tables, rows, pose, sd)
+    table = tables.table_at(which, level)
+    loss, off, slope = seen.loss(tables, table, pose, sd)
     for step in range(STEPS):
         if step == SIFT_STEP:
             best = np.argsort(loss.reshape(count, STARTS), axis=1, kind="stable")[:, :SIFTED]
             best = (best + STARTS * np.arange(count)[:, None]).ravel().repeat(len(LEVELS_M))
             pose, damping, which = pose[best], damping[best], which[best]
             level = np.tile(np.arange(len(LEVELS_M)), count * SIFTED)
-            rows = tables.rows(which, level)
-            loss, off, slope = seen.loss(tables, rows, pose, sd)
+            table = tables.table_at(which, level)
+            loss, off, slope = seen.loss(tables, table, pose, sd)
         weight = 1.0 / (1.0 + (off / sd) ** 2 / 9.0) / sd**2
         weighed = weight[..., None] * slope
         hessian = weighed.transpose(0, 2, 1) @ slope + np.diag(PRIOR_WEIGHT + 1e-3)
         gradient = (weighed * off[..., None]).sum(axis=1) + (pose - seen.centre) * PRIOR_WEIGHT
         damped = hessian * (1.0 + damping[:, None, None] * np.eye(3))
         move = np.clip(-np.linalg.solve(damped, gradient[..., None])[..., 0], -LONGEST_STEP, LONGEST_STEP)
-        trial_loss, trial_off, trial_slope = seen.loss(tables, rows, pose + move, sd)
+        trial_loss, trial_off, trial_slope = seen.loss(tables, table, pose + move, sd)
         better = trial_loss < loss
         pose[better] += move[better]
         loss[better], off[better], slope[better] = trial_loss[better], trial_off[better], trial_slope[better]
         damping *= np.where(better, 0.3, 5.0)
     kept = [_distinct(np.flatnonzero(which == i), loss, level, pose) for i in range(count)]
     every = np.concatenate(kept)
-    pose, level, rows = pose[every], level[every], (rows[0][every], rows[1][every])
-    logs, yaw_sd = zip(*(seen.evidence(tables, rows, pose, sd) for sd in SCATTER_M), strict=True)
+    pose, level, table = pose[every], level[every], (table[0][every], table[1][every])
+    logs, yaw_sd = zip(*(seen.evidence(tables, table, pose, sd) for sd in SCATTER_M), strict=True)
     by_pose = np.logaddexp.reduce(np.array(logs), axis=0) + LEVEL_PRIOR[level]
     widest, any_outline, ends = np.max(yaw_sd, axis=0), _log_any_outline(contacts), np.cumsum([len(k) for k in kept])
     fits = []
@@ -199,7 +210,10 @@ def _fit(sections: Sequence[TargetSection], contacts: tuple[Contact, ...]) -> li
 
 
 def _distinct(of: Indices, loss: Array, level: Indices, pose: Array) -> Indices:
-    """Return the likely poses among those of indices `of` that differ from each other, the best first."""
+    """Return the indices of the likely poses among those of indices `of`, the best first.
+
+    Of poses at the same level that differ in yaw by less than `SAME_RAD`, only the best is kept.
+    """
     order = of[np.argsort(loss[of], kind="stable")]
     order = order[loss[order] <= loss[order[0]] + UNLIKELY_NATS]
     apart = np.abs(wrapped(pose[order, 2][:, None] - pose[order, 2])) > SAME_RAD
@@ -227,27 +241,27 @@ class _Seen:
         middle = 0.5 * (tips.min(axis=0) + tips.max(axis=0))
         return cls(tips, np.arctan2(reaction[:, 1], reaction[:, 0]), middle, np.array([*middle, 0.0]))
 
-    def loss(self, tables: SectionTables, rows: Rows, pose: Array, sd_m: float) -> tuple[Array, Array, Array]:
+    def loss(self, tables: SectionTables, table: TableAt, pose: Array, sd_m: float) -> tuple[Array, Array, Array]:
         """Return negative log densities (s,) for poses (s, 3), distances (s, k), and their derivatives (s, k, 3)."""
-        off, turned, slope = self._residuals(tables, rows, pose)
+        off, turned, slope = self._residuals(tables, table, pose)
         prior = 0.5 * ((pose - self.centre) ** 2 * PRIOR_WEIGHT).sum(axis=1)
         return prior - _log_density(off, turned, sd_m).sum(axis=1), off, slope
 
-    def evidence(self, tables: SectionTables, rows: Rows, pose: Array, sd_m: float) -> tuple[Array, Array]:
+    def evidence(self, tables: SectionTables, table: TableAt, pose: Array, sd_m: float) -> tuple[Array, Array]:
         """Return the log evidence (s,) about each pose (s, 3), by Laplace's method, and the yaw's deviations (s,)."""
-        loss, off, slope = self.loss(tables, rows, pose, sd_m)
+        loss, off, slope = self.loss(tables, table, pose, sd_m)
         weight = 1.0 / (1.0 + (off / sd_m) ** 2 / 9.0) / sd_m**2
         hessian = (weight[..., None] * slope).transpose(0, 2, 1) @ slope + np.diag(PRIOR_WEIGHT + YAW_WEIGHT)
         volume = -0.5 * np.linalg.slogdet(hessian)[1] - 2 * math.log(CENTRE_SD_M) - 0.5 * math.log(2 * math.pi)
         return volume - loss - math.log(len(SCATTER_M)), np.sqrt(np.linalg.inv(hessian)[:, 2, 2])
 
-    def _residuals(self, tables: SectionTables, rows: Rows, pose: Array) -> tuple[Array, Array, Array]:
+    def _residuals(self, tables: SectionTables, table: TableAt, pose: Array) -> tuple[Array, Array, Array]:
         """Return distances (s, k), bearings less those of the normals (s, k), and derivatives (s, k, 3) of the
         distances, for poses (s, 3)."""
         c, s = np.cos(pose[:, 2:]), np.sin(pose[:, 2:])
         dx, dy = self.tips[:, 0] - pose[:, :1], self.tips[:, 1] - pose[:, 1:2]
         x, y = c * dx + s * dy, c * dy - s * dx
-        distance, gx, gy = tables.at(x, y, rows)
+        distance, gx, gy = tables.look_up(x, y, table)
         slope = np.stack([s * gy - c * gx, -(s * gx + c * gy), gx * y - gy * x], axis=-1)
         return distance, wrapped(self.bearing - np.arctan2(gy, gx) - pose[:, 2:]), slope
 

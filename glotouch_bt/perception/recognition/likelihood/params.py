@@ -51,7 +51,8 @@ class LikelihoodParams:
             observations; 0 leaves a part out (`ablation`).
         slope, offset: Calibration: log odds against the background = offset + slope * summed log ratios.
         outline_offset: The same offset for a candidate of which only outline and height were measured.
-        prior_absent: Prior probability that the target is none of the candidates.
+        prior_absent: Prior probability that the target is none of the candidates. Source: ours; "The likelihood
+            matcher" in docs/explanation/recognition.md.
         twin: Prior probability that another object is a twin, i.e. similar to the target.
         twin_width: Probability that a twin differs at a closure, or in a height band.
         twin_width_sd_m: Scale of this difference.

@@ -24,7 +24,14 @@ from glotouch_bt.perception.recognition.model.pads import (
 )
 from glotouch_bt.perception.recognition.model.parts import VERSION, from_parts, to_parts
 from glotouch_bt.perception.recognition.model.raster import hand_axes, mirrored, span
-from glotouch_bt.perception.recognition.model.section import LEVELS_M, SectionTables, TargetSection, section_of
+from glotouch_bt.perception.recognition.model.section import (
+    LEVELS_M,
+    Indices,
+    SectionTables,
+    TableAt,
+    TargetSection,
+    section_of,
+)
 from glotouch_bt.perception.recognition.model.simulated_touches import touch_windows
 from glotouch_bt.perception.recognition.model.target import (
     STRIDE,

@@ -19,6 +19,8 @@ from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
 
 Indices = npt.NDArray[np.int64]
+TableAt = tuple[Indices, Indices]
+"""For each pose (s,), the first cell and the width of the table in which it is looked up."""
 
 CELL_M = 0.002
 """Edge of a cell of the table; interpolation errs by 0.05 mm on an edge that the ball of 6 mm goes round."""
@@ -50,7 +52,7 @@ class TargetSection:
 
 @dataclass(frozen=True, eq=False)
 class SectionTables:
-    """Tables of several sections for a common look-up: one call for all hypotheses of a target.
+    """Tables of several sections, joined so that one call looks up all hypotheses of a target.
 
     Attributes:
         cells: (3, cells) distances and gradients of all of them, one table after the other.
@@ -71,19 +73,19 @@ class SectionTables:
             np.ascontiguousarray(np.concatenate(flat, axis=1)), first, np.array([s.table.shape[1] for s in sections])
         )
 
-    def rows(self, which: Indices, level: Indices) -> tuple[Indices, Indices]:
-        """Return the first cell (s,) and the width (s,) of the tables of sections (s,) at levels (s,)."""
+    def table_at(self, which: Indices, level: Indices) -> TableAt:
+        """Return the table of each pose, from the indices of its section (s,) and of its level in `LEVELS_M` (s,)."""
         width = self.width[which]
         return self.first[which] + level * width**2, width
 
-    def at(self, x_m: Array, y_m: Array, rows: tuple[Indices, Indices]) -> tuple[Array, Array, Array]:
+    def look_up(self, x_m: Array, y_m: Array, table: TableAt) -> tuple[Array, Array, Array]:
         """Return distances (s, k), m, and their gradients along x and y (s, k), by bilinear interpolation.
 
         Args:
-            x_m, y_m: (s, k) places of the ball's centre.
-            rows: Tables of the rows, of `rows`.
+            x_m, y_m: (s, k) places of the ball's centre about the section's origin.
+            table: The table of each pose, from `table_at`.
         """
-        first, n = rows[0][:, None], rows[1][:, None]
+        first, n = table[0][:, None], table[1][:, None]
         x, y = (np.clip(v / CELL_M + 0.5 * (n - 1), 0.0, n - 1 - 1e-6) for v in (x_m, y_m))
         i, j = x.astype(np.int64), y.astype(np.int64)
         x, y = x - i, y - j

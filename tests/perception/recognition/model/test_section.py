@@ -25,7 +25,7 @@ def look_up(section: TargetSection | None, places: list[tuple[float, float]], le
     assert section is not None
     tables = SectionTables.of([section_of(cylinder(0.02, 0.06), np.zeros(2)), section])
     x, y = np.array(places).T
-    return np.array(tables.at(x[None], y[None], tables.rows(np.array([1]), np.array([level]))))[:, 0]
+    return np.array(tables.look_up(x[None], y[None], tables.table_at(np.array([1]), np.array([level]))))[:, 0]
 
 
 def test_a_cylinder_is_felt_at_its_radius_and_that_of_the_ball() -> None:

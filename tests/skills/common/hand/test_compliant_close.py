@@ -164,7 +164,7 @@ def test_a_foot_under_a_fingertip_frees_the_hand_when_it_lets_go(bench: Any, wor
 
 
 class Askew(FakeRobot):
-    """An object that the gels feel at two places, `apart_m` from each other along the pads."""
+    """An object that the two gels touch at places `apart_m` from each other along x_P."""
 
     def __init__(self, apart_m: float) -> None:
         self.apart_m = apart_m
