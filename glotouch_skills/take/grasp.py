@@ -26,7 +26,7 @@ from glotouch_skills.common.planning import GraspPlan
 class GraspParams(SkillParams):
     """Parameters of `grasp`."""
 
-    force_N: float = param("Jaw force", unit="N", default=30.0, gt=0.0, le=30.0)
+    force_N: float = param("Jaw force", unit="N", default=20.0, gt=0.0, le=30.0)
     closing_speed_m_s: float = param("Closing speed", unit="m/s", default=0.03, gt=0.0, le=0.2)
     travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
     descent_speed_m_s: float = param(

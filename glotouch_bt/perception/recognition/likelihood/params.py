@@ -101,7 +101,7 @@ class LikelihoodParams:
     slope: float = 0.75
     offset: float = -1.5
     outline_offset: float = -1.0
-    prior_absent: float = 0.1
+    prior_absent: float = 0.15
     twin: float = 0.02
     twin_width: float = 0.5
     twin_width_sd_m: float = 3e-3
