@@ -17,7 +17,7 @@ from glotouch_backends.mujoco.control import (
 )
 from glotouch_backends.mujoco.model import STEP_S, STEPS, BuiltWorld
 from glotouch_backends.mujoco.sensing import GRAVITY_M_S2, PoseReports, Tactile, WristSensor, up_in
-from glotouch_backends.mujoco.simulation import CollisionFilter, ControlTrace, SnapshotStore
+from glotouch_backends.mujoco.simulation import CollisionFilter, ControlTrace, SnapshotStore, TrueForce
 from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import (
     Array,
@@ -41,8 +41,8 @@ MAX_HELD_DISTANCE_M = 0.02
 
 
 @compiled("f8[:, :, ::1]", "f8[::1]", "f8[:]", "i8")
-def largest_force_2(external: Array, probe: Array, pads: Array, hand: int) -> float:
-    """Return the largest square of the contact force in a period, N^2, on the hand, and on the probe while it is held.
+def forces_2(external: Array, probe: Array, pads: Array, hand: int) -> Array:
+    """Return the squares (steps,) of the contact force, N^2, on the hand, and on the probe while it is held.
 
     Args:
         external: (steps, bodies, 6) torque and force on the hand's bodies, and from the body `hand` on on the probe's.
@@ -51,15 +51,15 @@ def largest_force_2(external: Array, probe: Array, pads: Array, hand: int) -> fl
     """
     x, y, z = probe[0] - pads[0], probe[1] - pads[1], probe[2] - pads[2]
     bodies = external.shape[1] if x * x + y * y + z * z < MAX_HELD_DISTANCE_M**2 else hand
-    largest = 0.0
+    squares = np.zeros(len(external))
     for step in range(len(external)):
         x = y = z = 0.0
         for body in range(bodies):
             x += external[step, body, 3]
             y += external[step, body, 4]
             z += external[step, body, 5]
-        largest = max(largest, x * x + y * y + z * z)
-    return largest
+        squares[step] = x * x + y * y + z * z
+    return squares
 
 
 @compiled("f8[:, :]", "f8[:, :]", "f8[:]", "f8[:, :]", "given f8[:]", "f8")
@@ -129,7 +129,7 @@ class MujocoRobot(Robot):
         self._payload_load: tuple[float, Array] | None = None
         self._failed: BackendError | None = None
         self._closed = False
-        self.peak_force_N = 0.0
+        self.true_force = TrueForce(limits)
 
         self.trace = ControlTrace(model, data) if traced else None
         self._keeper = SnapshotStore(model, data)
@@ -265,7 +265,8 @@ class MujocoRobot(Robot):
         wrench = self._wrist.measure(-rows[:, s.force.start : s.torque.stop], up)
         self._add_to_tare(wrench, up)
         self._expected = self._wrist.expected(up)
-        self._note_peak()
+        pads = self._samples[-1, s.position]
+        self.true_force.note(forces_2(self._external, self._probe_now, pads, self._hand))
         last = rows[-1].tolist()
         jaws, speeds, forces = last[s.jaws], last[s.jaw_speeds], last[s.jaw_forces]
         self._aperture = jaws[0] + jaws[1]
@@ -287,12 +288,6 @@ class MujocoRobot(Robot):
             tactile=self._tactile.arrived(now_s, command.tactile),
             images=self._tactile.arrived_images(now_s),
         )
-
-    def _note_peak(self) -> None:
-        """Update the largest true contact force on the hand, and on the probe while it is held."""
-        pads = self._samples[-1, self._s.position]
-        largest_2 = largest_force_2(self._external, self._probe_now, pads, self._hand)
-        self.peak_force_N = max(self.peak_force_N, largest_2**0.5)
 
     def _set_payload(self) -> None:
         """Advance a payload request by one period; the block of its last period is compensated already."""

@@ -31,7 +31,8 @@ from glotouch_bt.runs import RunRequest
 
 COLUMNS = (
     "target", "seed", "exit_code", "status", "retrieved", "correct", "cause", "candidates", "contacts", "probe_path_m",
-    "peak_force_N", "sim_time_s", "wall_time_s", "folder",
+    "peak_force_N", "true_samples_over_limit", "contact_softness_s", "others_lifted", "sim_time_s",
+    "wall_time_s", "folder",
 )  # fmt: skip
 
 
@@ -79,6 +80,7 @@ def run_trial(head: Row, request: RunRequest) -> Row:
         "skill_time_s": done.result["skill_time_s"],
         "candidates": len(done.result["candidates"]),
         "cause": cause(done.result),
+        "others_lifted": others_lifted(done.result),
         "exit_code": done.exit_code,
     }
     return head | {k: done.result[k] for k in COLUMNS if k in done.result} | found
@@ -99,6 +101,12 @@ def cause(result: Mapping[str, Any]) -> str:
         return str(result["status"])
     root = chain[-1]
     return f"{root['node'].rsplit('/', 1)[-1]}: {root['code'] or 'failed'}"
+
+
+def others_lifted(result: Mapping[str, Any]) -> str:
+    """Return the objects besides the target that the mission ever lifted, also those it set down again."""
+    names = {lift["object"] for lift in result.get("lifted", ())} - {result.get("target"), None}
+    return ";".join(sorted(names))
 
 
 def run_campaign(campaign: RetrieveCampaign, executor: Executor, on_row: OnRow = silent) -> dict[str, Any]:
@@ -134,6 +142,7 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "success": wilson(sum(map(succeeded, rows)), n),
         "success_over_worlds": bootstrap_mean([float(np.mean(v)) for v in by_seed.values()]),
         "wrong_object": wilson(wrong, n),
+        "other_ever_lifted": wilson(sum(bool(r.get("others_lifted")) for r in rows), n),
         "safety_stops": wilson(sum(r.get("exit_code") == 3 for r in rows), n),
         "tracebacks": wilson(sum(r.get("status") == "traceback" for r in rows), n),
         "lost": sum(r.get("status") == "lost" for r in rows),
@@ -146,7 +155,26 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "peak_force_N": bootstrap_mean([r["peak_force_N"] for r in rows if r.get("peak_force_N") is not None]),
         "skill_time_s": _mean_by_skill([r["skill_time_s"] for r in rows if r.get("skill_time_s")]),
         "largest_peak_force_N": max((float(r.get("peak_force_N") or 0.0) for r in rows), default=0.0),
+        "most_samples_over_limit": max((int(r.get("true_samples_over_limit") or 0) for r in rows), default=0),
+        "peak_by_softness": peak_by_softness(rows),
     }
+
+
+def peak_by_softness(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, float]]:
+    """Return the true peaks of the harder and of the softer half of the worlds; one group if all are alike."""
+    known = [r for r in rows if r.get("contact_softness_s") is not None and r.get("peak_force_N") is not None]
+    ordered = sorted(known, key=lambda r: r["contact_softness_s"])
+    alike = len({r["contact_softness_s"] for r in ordered}) < 2
+    half = len(ordered) if alike else len(ordered) // 2
+    groups = []
+    for group in filter(None, (ordered[:half], ordered[half:])):
+        peaks = [r["peak_force_N"] for r in group]
+        middle, high = np.quantile(peaks, (0.5, 0.9)).tolist()
+        groups.append({
+            "from_s": group[0]["contact_softness_s"], "to_s": group[-1]["contact_softness_s"], "n": len(group),
+            "median_N": middle, "p90_N": high, "largest_N": max(peaks),
+        })  # fmt: skip
+    return groups
 
 
 def _mean_by_skill(trials: Sequence[Mapping[str, float]]) -> dict[str, float]:

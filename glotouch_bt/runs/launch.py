@@ -35,6 +35,7 @@ from glotouch_bt.robot import (
 )
 from glotouch_bt.robot.simulation import Referee, TrueObject
 from glotouch_bt.runs.folder import MODELS, RunFolder, locked
+from glotouch_bt.runs.lift_witness import LiftWitness
 from glotouch_bt.runs.request import RunRequest, RunResult
 from glotouch_bt.runs.result import description, final_truth, installed_versions, mission_yaml, score, truth
 from glotouch_bt.runs.resume_point import ResumableRun, describe_checkpointed_run
@@ -194,7 +195,8 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
         begin = partial(run.resumable.begin, recorder.path, recorder, resume_point.same_world)
         resume_point = replace(resume_point, on_restored=begin)
     injector = injector_in(robot)
-    record: Record = recorder if injector is None else ListeningRecord(recorder, injector)
+    lifts = LiftWitness(recorder, referee)
+    record: Record = lifts if injector is None else ListeningRecord(lifts, injector)
 
     def exit_stuck(stuck: SkillHung, outcome: Outcome) -> None:
         """Write what is known and end the process, because the main thread hangs in a skill."""
@@ -233,6 +235,7 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
             ended = time.perf_counter()
             seen, unscored = final_truth(referee)
             result = score(request, mission, outcome, seen, robot) | ({"unscored": unscored} if unscored else {})
+            result |= {} if referee is None else {"lifted": lifts.lifted}
             result |= {"wall_time_s": round(ended - ready, 3), "wall_open_s": round(ready - run.began, 3)}
             if run.resumable is not None:
                 result["resumed"] = [*run.resumable.before, run.resumable.as_dict()]

@@ -62,6 +62,8 @@ class FinalTruth:
 
     objects: list[TrueObject]
     peak_force_N: float
+    samples_over_limit: int
+    contact_softness_s: float
     tip_B_m: list[float]
     silent_axes: tuple[str, ...]
 
@@ -72,7 +74,12 @@ def final_truth(referee: Referee | None) -> tuple[FinalTruth | None, str]:
         return None, ""
     try:
         return FinalTruth(
-            referee.objects(), referee.peak_force_N(), referee.tip_B_m().tolist(), referee.silent_axes()
+            objects=referee.objects(),
+            peak_force_N=referee.peak_force_N(),
+            samples_over_limit=referee.samples_over_limit(),
+            contact_softness_s=referee.contact_softness_s(),
+            tip_B_m=referee.tip_B_m().tolist(),
+            silent_axes=referee.silent_axes(),
         ), ""
     except Exception as e:  # also of the solver's geometry, when a world has exploded
         return None, f"the simulated world can no longer be asked for the truth: {e}"
@@ -120,6 +127,8 @@ def score(
         "probe_path_m": round(found.probe_path_m, 6),
         "peak_force_N": round(float(peak), 6),
         "true_peak_force_N": None if seen is None else round(float(seen.peak_force_N), 6),
+        "true_samples_over_limit": None if seen is None else seen.samples_over_limit,
+        "contact_softness_s": None if seen is None else round(seen.contact_softness_s, 6),
         "sensed_peak_force_N": round(found.peak_force_N, 6),
         # without paths of this machine
         "parameters": {k: _stem(str(v)) if k in mission.stl_parameters else v for k, v in mission.parameters.items()},

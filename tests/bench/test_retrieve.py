@@ -96,3 +96,18 @@ def test_targets_take_turns_over_the_seeds(campaign: retrieve.RetrieveCampaign) 
     turns = replace(campaign, targets=("apple", "train", "truck"), per_seed=2, seeds=range(3))
     tried = [(t.identity["settings"]["target"], t.identity["seed"]) for t in turns.trials()]
     assert tried == [("apple", 0), ("train", 0), ("truck", 1), ("apple", 1), ("train", 2), ("truck", 2)]
+
+
+def test_an_object_that_was_lifted_and_set_down_again_is_counted() -> None:
+    lifts = [{"object": "b"}, {"object": None}, {"object": "a"}, {"object": "b"}]
+    assert retrieve.others_lifted({"target": "a", "lifted": lifts}) == "b"
+    assert retrieve.others_lifted({"target": "a"}) == ""
+
+
+def test_peaks_are_grouped_by_the_softness_of_the_contacts() -> None:
+    rows = [{"contact_softness_s": s, "peak_force_N": p} for s, p in ((0.004, 8.0), (0.002, 20.0), (0.003, 10.0))]
+    harder, softer = retrieve.peak_by_softness(rows)
+    assert (harder["n"], harder["median_N"], harder["to_s"]) == (1, 20.0, 0.002)
+    assert (softer["n"], softer["median_N"], softer["largest_N"]) == (2, 9.0, 10.0)
+    assert len(retrieve.peak_by_softness([{"contact_softness_s": 0.004, "peak_force_N": 8.0}] * 4)) == 1
+    assert retrieve.peak_by_softness([{"peak_force_N": 8.0}]) == []

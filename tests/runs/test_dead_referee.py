@@ -36,6 +36,12 @@ class TellingReferee(DyingReferee):
     def peak_force_N(self) -> float:
         return 0.0
 
+    def samples_over_limit(self) -> int:
+        return 0
+
+    def contact_softness_s(self) -> float:
+        return 0.004
+
     def tip_B_m(self) -> np.ndarray:
         return np.zeros(3)
 

@@ -56,6 +56,14 @@ class RemoteReferee:
         """See `Referee`."""
         return self._ask("peak_force_N").numbers[0]
 
+    def samples_over_limit(self) -> int:
+        """See `Referee`."""
+        return int(self._ask("samples_over_limit").numbers[0])
+
+    def contact_softness_s(self) -> float:
+        """See `Referee`."""
+        return self._ask("contact_softness_s").numbers[0]
+
     def silent_axes(self) -> tuple[str, ...]:
         """See `Referee`; the answer holds their places in `AXES`."""
         return tuple(AXES[int(i)] for i in self._ask("silent_axes").numbers)

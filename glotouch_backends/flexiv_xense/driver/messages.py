@@ -211,7 +211,16 @@ class RefereeRequest(_Numbered, frozen=True, kw_only=True):
     """
 
     method: Literal[
-        "objects", "pose_B_K", "tip_B_m", "push_tip", "probe_in_holder", "peak_force_N", "silent_axes", "disturb"
+        "objects",
+        "pose_B_K",
+        "tip_B_m",
+        "push_tip",
+        "probe_in_holder",
+        "peak_force_N",
+        "samples_over_limit",
+        "contact_softness_s",
+        "silent_axes",
+        "disturb",
     ]
     force_B_N: Three = (0.0, 0.0, 0.0)
     name: str = ""

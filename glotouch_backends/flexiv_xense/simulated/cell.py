@@ -240,7 +240,7 @@ def main(argv: list[str]) -> int:
         threading.Thread(target=cell.serve, args=(listener,), daemon=True).start()
         cell.write("ready", urgent=granted)
         cell.live()
-        cell.write("end", peak_force_N=world.peak_force_N)
+        cell.write("end", peak_force_N=world.true_force.peak_N)
     return 0
 
 

@@ -49,6 +49,10 @@ class DisturbingReferee(MujocoReferee):
                 numbers = (float(self.probe_in_holder()),)
             case "peak_force_N":
                 numbers = (self.peak_force_N(),)
+            case "samples_over_limit":
+                numbers = (float(self.samples_over_limit()),)
+            case "contact_softness_s":
+                numbers = (self.contact_softness_s(),)
             case "silent_axes":
                 numbers = tuple(float(AXES.index(axis)) for axis in self.silent_axes())
             case "disturb":

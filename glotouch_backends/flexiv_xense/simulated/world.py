@@ -12,7 +12,7 @@ from glotouch_backends.flexiv_xense.simulated.hand import SimulatedHand
 from glotouch_backends.mujoco import MAX_HELD_DISTANCE_M, build_world
 from glotouch_backends.mujoco.control import check_sane
 from glotouch_backends.mujoco.model import STEP_S, STEPS
-from glotouch_backends.mujoco.simulation import ControlTrace
+from glotouch_backends.mujoco.simulation import ControlTrace, TrueForce
 from glotouch_backends.options import WorldOptions
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_backends.trial_message import trial_of_message
@@ -46,7 +46,7 @@ class SimulatedWorld:
         built = build_world(description, world, conditions, seed, options)
         self.truth, self.model, self.data, self.handles = built.truth, built.model, built.data, built.handles
         self.trace: ControlTrace | None = None
-        self.peak_force_N = 0.0
+        self.true_force = TrueForce()
         self.proof = built.proof
         self.arm = SimulatedArm(built)
         self.hand = SimulatedHand(built)
@@ -110,9 +110,9 @@ class SimulatedWorld:
         return math.sqrt(float(force @ force))
 
     def _note_peak(self) -> None:
-        """Update the largest true contact force on the hand, and on the probe while it is held."""
+        """Note the true contact force on the hand, and on the probe while it is held."""
         h = self.handles
         gap = self.data.xpos[h.probe_body] - self._samples[-1, h.sensors.position]
         self._counted[3:] = float(gap @ gap) < MAX_HELD_DISTANCE_M**2
         force = (self._counted @ self._external)[:, 3:]
-        self.peak_force_N = max(self.peak_force_N, float((force * force).sum(axis=1).max()) ** 0.5)
+        self.true_force.note((force * force).sum(axis=1))

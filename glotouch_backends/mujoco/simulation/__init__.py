@@ -5,3 +5,4 @@ from glotouch_backends.mujoco.simulation.control_trace import ControlTrace
 from glotouch_backends.mujoco.simulation.disturber import MujocoDisturber
 from glotouch_backends.mujoco.simulation.referee import MujocoReferee, Simulated
 from glotouch_backends.mujoco.simulation.snapshot import SnapshotStore
+from glotouch_backends.mujoco.simulation.true_force import TrueForce

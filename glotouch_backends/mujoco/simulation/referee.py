@@ -11,6 +11,7 @@ from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.sensing import body_pose
 from glotouch_backends.mujoco.simulation.control_trace import ControlTrace
 from glotouch_backends.mujoco.simulation.disturber import Disturbed
+from glotouch_backends.mujoco.simulation.true_force import TrueForce
 from glotouch_bt.robot import Array, Pose
 from glotouch_bt.robot.simulation import BareSteps, TrueObject
 
@@ -23,7 +24,7 @@ MIN_STOWED_COSINE = 0.996
 class Simulated(Disturbed, Protocol):
     """The parts of a simulated robot that its referee reads."""
 
-    peak_force_N: float
+    true_force: TrueForce
     proof: AxisProof
     trace: ControlTrace | None
 
@@ -73,7 +74,15 @@ class MujocoReferee:
 
     def peak_force_N(self) -> float:
         """See `Referee`."""
-        return self._robot.peak_force_N
+        return self._robot.true_force.peak_N
+
+    def samples_over_limit(self) -> int:
+        """See `Referee`."""
+        return self._robot.true_force.samples_over
+
+    def contact_softness_s(self) -> float:
+        """See `Referee`."""
+        return self._robot.truth.contact_s
 
     def silent_axes(self) -> tuple[str, ...]:
         """See `Referee`."""

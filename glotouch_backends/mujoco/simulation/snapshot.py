@@ -29,8 +29,8 @@ from glotouch_backends.mujoco.simulation.snapshot_check import (
 )
 from glotouch_bt.robot import BadInput, SafetyStop, Snapshot
 
-FORMAT = 4
-PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_depth", "_taxels", "_reports", "proof")
+FORMAT = 5
+PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_depth", "_taxels", "_reports", "proof", "true_force")
 FIXED: Mapping[str, frozenset[str]] = {
     "MujocoRobot": frozenset(
         (
@@ -77,6 +77,7 @@ FIXED: Mapping[str, frozenset[str]] = {
     ),
     "TaxelErrors": frozenset(("_noise_m", "_offset", "_dead")),
     "JawReports": frozenset(("_c", "_proof")),
+    "TrueForce": frozenset(("_limit_2",)),
     "AxisProof": frozenset(("_open",)),
 }
 """Attributes, by class, that follow from world, conditions, seed and options alone."""

@@ -20,7 +20,8 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
 
     rows = [(target, rate(r)) for target, r in summary["by_target"].items()]
     rows += [(name, rate(summary[key])) for name, key in (
-        ("all targets", "success"), ("wrong object lifted", "wrong_object"), ("safety stops", "safety_stops"),
+        ("all targets", "success"), ("wrong object lifted", "wrong_object"),
+        ("another object ever lifted", "other_ever_lifted"), ("safety stops", "safety_stops"),
         ("tracebacks", "tracebacks"))]  # fmt: skip
     seeds = summary["seeds"]
     world = f" in {summary['world']}" if "world" in summary else ""
@@ -33,7 +34,8 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
         print_table("robot time by skill, mean", ("skill", "s"), shown)
     EscapingConsole().print(
         f"robot time {summary['median_sim_s']:.0f} s, wall time {summary['median_wall_s']:.0f} s in the median; "
-        f"largest peak force {summary['largest_peak_force_N']:.1f} N\n{folder / 'summary.json'}",
+        f"largest peak force {summary['largest_peak_force_N']:.1f} N, "
+        f"at most {summary['most_samples_over_limit']} samples in a row beyond the limit\n{folder / 'summary.json'}",
         markup=False,
     )
 

@@ -72,6 +72,14 @@ class Referee(Protocol):
         """Return the largest norm so far of the true contact force on the hand and what it holds."""
         ...
 
+    def samples_over_limit(self) -> int:
+        """Return the largest number so far of consecutive samples of that force beyond the hard limit."""
+        ...
+
+    def contact_softness_s(self) -> float:
+        """Return the time constant of the world's contacts, which is drawn from the conditions."""
+        ...
+
     def silent_axes(self) -> tuple[str, ...]:
         """Return the axes of the conditions that were set and used, and yet altered nothing so far."""
         ...

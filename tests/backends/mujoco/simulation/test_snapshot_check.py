@@ -77,8 +77,8 @@ BAD: dict[str, Change] = {
     "a frame of another size": put("parts", "_tactile", "_frames", value=deque([(0.0, np.zeros(2))])),
     "a tare of words": put("parts", "robot", "_tare", value="soon"),
     "a payload of another size": put("parts", "robot", "_payload_load", value=(0.1, np.zeros(7))),
-    "text among numbers": put("parts", "robot", "peak_force_N", value="30"),
-    "a peak that is not finite": put("parts", "robot", "peak_force_N", value=float("nan")),
+    "text among numbers": put("parts", "true_force", "peak_N", value="30"),
+    "a peak that is not finite": put("parts", "true_force", "peak_N", value=float("nan")),
 }
 
 
