@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from glotouch_bt.perception.recognition.model import (
+    SENSING_M,
     TIP_RADIUS_M,
     PadSpec,
     first_hit,
@@ -22,7 +23,7 @@ from glotouch_bt.perception.recognition.model import (
     minimum_rectangle,
     traced_tips,
 )
-from glotouch_bt.perception.touch import Candidate, Layer, TouchSequence, TouchSet, fit_contour
+from glotouch_bt.perception.touch import Candidate, Contact, Layer, TouchSequence, TouchSet, fit_contour
 from glotouch_bt.robot import Array
 from glotouch_bt.robot.scene import Mesh
 
@@ -130,8 +131,10 @@ def true_gel(pad: PadSpec, d: Disturbance, rng: np.random.Generator) -> PadSpec:
     return PadSpec(pad.window_m, pad.shape, pad.depth_m, stiffness, pad.limit_m, FORCE_N)
 
 
-def traced(solid: trimesh.Trimesh, pose: Array, d: Disturbance, rng: np.random.Generator, index: int) -> Candidate:
-    """Return the candidate that the probe would trace."""
+def traced(
+    solid: trimesh.Trimesh, pose: Array, d: Disturbance, rng: np.random.Generator, index: int, *, contacts: bool = False
+) -> Candidate:
+    """Return the candidate that the probe would trace; with `contacts` they are compared with the target's section."""
     middle = minimum_rectangle(np.asarray(solid.vertices)[:, :2])[3]
     tips = traced_tips(solid, middle + rng.normal(0, 4e-3, 2), int(rng.integers(8, 13)), rng.uniform(0, 2 * np.pi))
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -139,7 +142,18 @@ def traced(solid: trimesh.Trimesh, pose: Array, d: Disturbance, rng: np.random.G
     tips = tips @ turn.T + pose[:2] + rng.normal(0, d.contact_sd_m, tips.shape) + rng.normal(0, d.centre_sd_m, 2)
     contour = fit_contour(tips, TIP_RADIUS_M)
     height = float(solid.vertices[:, 2].max()) + rng.normal(0, d.height_sd_m)
-    return Candidate(index, contour, height, 1.0, ())
+    return Candidate(index, contour, height, 1.0, _contacts(tips) if contacts else ())
+
+
+def _contacts(tips_m: Array) -> tuple[Contact, ...]:
+    """Return the contacts of ball centres (k, 2) that came from outside towards their mean."""
+    inward = tips_m.mean(axis=0) - tips_m
+    inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-9)
+    return tuple(
+        Contact(float(i), np.array([*tip, SENSING_M]), np.array([*way, 0.0]), np.array([*-way, 0.0]),
+                tip + TIP_RADIUS_M * way, 1.0)
+        for i, (tip, way) in enumerate(zip(tips_m, inward, strict=True))
+    )  # fmt: skip
 
 
 def squeeze(
