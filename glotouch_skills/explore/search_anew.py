@@ -39,12 +39,14 @@ class SearchAnew(Skill):
 
     before = In(SearchMap, "what has been explored so far", key="map", required=False)
     map = Out(SearchMap, "where to search now")
+    found = Out(int, "number of traced objects")
 
     def run(self) -> SkillRun:
         """See the class."""
         yield HOLD
         if self.before is None:
             raise self.NOTHING_SEARCHED("there is no map yet")
+        self.found = self.before.found
         if self.params.more_objects:
             self.map = replace(self.before, expected=self.before.found + self.params.more_objects)
             return

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import Belief, TargetModel
 
 MAX_VAIN_CLOSURES = 4
-"""Number of closures without any plateau after which a candidate is skipped: it is not where it was traced."""
+"""Number of closures without any plateau after which a candidate is skipped and doubted: it is not where it was
+traced."""
 
 MEASURE_S = CHANGE_S + 34.0
 """Robot time of taking the probe again and measuring one candidate. Source: as of `CHANGE_S` and `next_probe`."""
@@ -97,7 +98,7 @@ class TouchNext(Skill):
     refused = Out(tuple, "closures that could not be made: candidate, yaw in degrees, height and place in mm")
     doubtful = Out(
         tuple,
-        "indices of candidates that may have moved: a closure met something, none has felt them since",
+        "indices of candidates that may be elsewhere: a closure met something, or all met nothing; none felt them since",
         element=int,
     )
     cramped = Out(
@@ -152,6 +153,7 @@ class TouchNext(Skill):
         belief = recognition.infer_belief(self._target_model(), touchsets)
         vain = (t for t in touchsets if not any(layer.stable for layer in t.layers))
         self._hopeless = frozenset(t.candidate.index for t in vain if len(t.layers) >= MAX_VAIN_CLOSURES)
+        self.doubtful = tuple(sorted({*self.doubtful, *self._hopeless}))
         why = recognition.enough(belief, self.params.confidence, self._hopeless)
         chosen = None if why else self._choose(belief, down)
         self._tell_unfit()

@@ -78,6 +78,15 @@ def test_if_all_was_measured_the_probe_is_taken_again_only_to_search_on(retrieve
     assert run.before("tool_pickup 5", "search_anew 2")
 
 
+def test_what_is_doubtful_is_measured_anew_though_the_search_finds_nothing_more(retrieve: Run) -> None:
+    script = {"match": REFUSED, "match 2": REFUSED, "match 5": ok(), "touch_next*": DECIDED}
+    script |= {"measure_anew": ok(given_up=1, anew=(0,), probed=()), "search_anew 2": ok(found=1)}
+    run = scheduled(retrieve, script | {"guarded_sweep 2": fails("search_exhausted", exhausted=True)})
+    assert run.succeeded
+    last = skills(run, "*/search_on/*")
+    assert [last.count(s) for s in ("guarded_sweep", "refine_outline", "touch_top")] == [1, 1, 1]
+
+
 @each_code("tool_pickup")
 def test_without_the_probe_the_rest_is_touched_as_it_is(retrieve: Run, code: str) -> None:
     script = {"match": REFUSED, "match 2": REFUSED, "match 4": ok(), "touch_next*": DECIDED, "orbit_probe": found(2)}

@@ -184,6 +184,7 @@ def test_a_candidate_that_is_gone_is_left_alone(make) -> None:
     repeat(b, skill)
     assert [len(t.layers) for t in skill.touchsets] == [module.MAX_VAIN_CLOSURES] * 2
     assert not any(layer.stable for t in skill.touchsets for layer in t.layers)
+    assert skill.doubtful == (0, 1), "they are not where they were traced"
 
 
 def test_it_closes_beside_a_stance_where_the_hand_does_not_fit(make, monkeypatch) -> None:
