@@ -98,7 +98,7 @@ class TouchNext(Skill):
     refused = Out(tuple, "closures that could not be made: candidate, yaw in degrees, height and place in mm")
     doubtful = Out(
         tuple,
-        "indices of candidates that may be elsewhere: a closure met something, or all met nothing; none felt them since",
+        "indices of candidates that may be elsewhere: a closure met something, or all met nothing, and none felt them",
         element=int,
     )
     cramped = Out(
