@@ -155,7 +155,7 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "peak_force_N": bootstrap_mean([r["peak_force_N"] for r in rows if r.get("peak_force_N") is not None]),
         "skill_time_s": _mean_by_skill([r["skill_time_s"] for r in rows if r.get("skill_time_s")]),
         "largest_peak_force_N": max((float(r.get("peak_force_N") or 0.0) for r in rows), default=0.0),
-        "most_samples_over_limit": max((int(r.get("true_samples_over_limit") or 0) for r in rows), default=0),
+        "max_samples_over_limit": max((int(r.get("true_samples_over_limit") or 0) for r in rows), default=0),
         "peak_by_softness": peak_by_softness(rows),
     }
 

@@ -35,7 +35,7 @@ def print_retrieve(summary: dict[str, Any], folder: Path) -> None:
     EscapingConsole().print(
         f"robot time {summary['median_sim_s']:.0f} s, wall time {summary['median_wall_s']:.0f} s in the median; "
         f"largest peak force {summary['largest_peak_force_N']:.1f} N, "
-        f"at most {summary['most_samples_over_limit']} samples in a row beyond the limit\n{folder / 'summary.json'}",
+        f"at most {summary['max_samples_over_limit']} samples in a row beyond the limit\n{folder / 'summary.json'}",
         markup=False,
     )
 

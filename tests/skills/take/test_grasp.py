@@ -36,7 +36,7 @@ def test_the_jaws_close_at_the_place(make) -> None:
     targets = [c.gripper for c in b.commands if c.gripper is not None]
     assert {round(t.aperture_m, 6) for t in targets[1:]} == {0.0}
     assert round(targets[0].aperture_m, 6) == 0.07
-    assert (targets[1].force_N, targets[-1].force_N) == (3.0, 30.0)
+    assert (targets[1].force_N, targets[-1].force_N) == (3.0, 20.0)
 
 
 def test_grasp__no_grasp__jaws_close_on_nothing(make) -> None:
