@@ -104,7 +104,7 @@ def cause(result: Mapping[str, Any]) -> str:
 
 
 def others_lifted(result: Mapping[str, Any]) -> str:
-    """Return the objects besides the target that the mission ever lifted, also those it set down again."""
+    """Return the objects besides the target that were ever lifted: by mistake, or as neighbours to make space."""
     names = {lift["object"] for lift in result.get("lifted", ())} - {result.get("target"), None}
     return ";".join(sorted(names))
 

@@ -1,4 +1,4 @@
-"""What the jaws hold at every lift is asked of the referee; one that is dead does not end the mission."""
+"""LiftWitness asks the referee at every lift. A referee that fails does not end the mission."""
 
 from types import SimpleNamespace
 from typing import Any

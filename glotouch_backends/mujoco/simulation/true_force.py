@@ -6,7 +6,7 @@ from glotouch_bt.robot import Array, Limits
 
 
 class TrueForce:
-    """What the referee knows of the contact force on the hand, and on the probe while it is held.
+    """Peak of the true contact force on the hand and the held probe, and the longest time beyond the hard limit.
 
     Attributes:
         peak_N: Largest norm so far.
