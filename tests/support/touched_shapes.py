@@ -45,6 +45,8 @@ from tests.support.any_shape import KINDS, drawn
 PAD = PadSpec(XENSE_GRIPPER.pad_window_m, XENSE_GRIPPER.pad_shape, XENSE_GRIPPER.pad_depth_m)
 CLOSURES = 8
 """Most closures of a trial."""
+CONFIDENCE = 0.97
+"""Sufficient probability. Source: default of `touch_next`."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ def try_shape(seed: int, number: int, disturbance: Disturbance | None = None) ->
     for _ in range(CLOSURES):
         belief = infer_belief(model, touchsets)
         check_belief(belief)
-        if enough(belief, 0.95, frozenset()):
+        if enough(belief, CONFIDENCE, frozenset()):
             break
         chosen = choose(belief, params)
         if chosen is None:
@@ -152,7 +154,7 @@ def choose(belief: Belief, p: ClosureParams) -> Option | None:
     closures: list[Closure] = [c for o in found for c in (o.closure, *o.after)]
     gains = np.split(expected_gain(belief, closures), np.cumsum([1 + len(o.after) for o in found])[:-1])
     assert all(np.isfinite(g).all() for g in gains)
-    first = wanted(belief, 0.95, frozenset())
+    first = wanted(belief, CONFIDENCE, frozenset())
     rates = best_rates(found, gains) + np.array([1e3 * (o.closure.candidate in first) for o in found])
     return found[int(np.argmax(rates))]
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-PROTOCOL = 6
+PROTOCOL = 7
 """Version of the messages; client and driver must have the same."""
 MAX_REQUEST_BYTES = 64 * 1024
 """Largest request without the world of simulated devices; `Open` with all its limits has 1 kB. Source: ours."""
