@@ -76,4 +76,4 @@ def test_the_probe_is_kept_from_the_holder_and_back_whatever_is_broken_off(simul
     b.run(back)
     assert back.status is Status.SUCCESS, back.feedback_message
     assert referee.probe_in_holder()
-    assert b.robot.peak_force_N < b.robot.limits.hard_force_N
+    assert referee.peak_force_N() < b.robot.limits.hard_force_N
