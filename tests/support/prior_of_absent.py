@@ -38,6 +38,8 @@ def main() -> None:
             for row in csv.DictReader(f):
                 if row["method"] == "likelihood" and row["stranger"] != "True":
                     decisions[str(path), row["seed"], row["target"]].append(row)
+    if not decisions:
+        sys.exit("no pairs.csv of `glotouch bench match --method likelihood` in these folders")
     for prior in PRIORS:
         p = replace(LikelihoodParams(), prior_absent=prior)
         right = wrong = taken = 0
