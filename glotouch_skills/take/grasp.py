@@ -153,8 +153,7 @@ class Grasp(Skill):
         Raises:
             MotionRefused: Even the narrowest collides.
         """
-        stroke = self.context.arm.description.gripper.stroke_m
-        widest = min(plan.opening_m, stroke)
+        widest = plan.opening_m
         narrowest = min(max(plan.aperture_m + 2 * self.params.side_gap_m, widest - 0.012), widest)
         for opening in (widest, 0.5 * (widest + narrowest)):
             try:

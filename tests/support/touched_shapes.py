@@ -130,7 +130,7 @@ def try_shape(seed: int, number: int, disturbance: Disturbance | None = None) ->
     if best.layers:
         plan = plan_grasp(best, ranking.best, mesh, model, XENSE_GRIPPER)
         fitted = plan.source == "fitted"
-        assert plan.opening_m <= XENSE_GRIPPER.stroke_m + 0.05
+        assert plan.opening_m <= XENSE_GRIPPER.stroke_m
         widths_m(model, float(plan.position_K_m[2]))
     return Touched(
         kind, model.height_m, ranking.best.index == 0, ranking.accepted, sum(len(t.layers) for t in touchsets), fitted

@@ -65,7 +65,7 @@ class GraspPlan:
         position_K_m: (3,) pads' mid-point in K (z above the floor).
         yaw_rad: Direction of x_P in K.
         aperture_m: Measured or expected aperture there; the jaws must stop near it.
-        opening_m: Aperture during the descent.
+        opening_m: Aperture during the descent, at most the stroke.
         alternatives: Other grasps of the same object, best first.
         source: `fitted` (from the mesh, or from a remembered closure) or `felt` (from a closure).
         quat: Rotation (w, x, y, z) of the mesh onto the side on which the object is taken to stand.
@@ -124,7 +124,10 @@ def plan_grasp(
             holds = _remembered_holds(model, solid)
         fitted = _fitted(index, match, model, holds, side_gap_m)
     felt = _felt(touchset, _placed(com, match), side_gap_m)
-    plans = [replace(plan, quat=match.quat) for plan in (*fitted, *felt)][: 1 + ALTERNATIVES]
+    plans = [
+        replace(plan, opening_m=min(plan.opening_m, gripper.stroke_m), quat=match.quat)
+        for plan in (*fitted, *felt)[: 1 + ALTERNATIVES]
+    ]
     return replace(plans[0], alternatives=tuple(plans[1:]))
 
 
