@@ -250,7 +250,7 @@ def of_another(known: tuple[Candidate, ...], radius_m: float, contacts: tuple[Co
 
     return any(
         c.quality >= KNOWN_QUALITY
-        and float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < SAME_M
+        and float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < PART_M
         and gain(c.contacts) - gain(contacts) > SEPARATE_NATS
         for c in known
     )

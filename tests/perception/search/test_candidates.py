@@ -200,3 +200,13 @@ def test_a_contact_in_the_gap_between_two_discs_belongs_to_the_one_that_was_met(
     assert not of_another((), R, mine, new[0])
     hardly_known = dataclasses.replace(neighbour, quality=0.2)
     assert not of_another((hardly_known,), R, mine, new[0]), "it may be a part of the same disc"
+
+
+def test_a_contact_at_the_unknown_end_of_a_box_belongs_to_the_box():
+    """The end lies 15 mm beyond all contacts of the box; the traced disc, of 60 mm, stands 20 mm beyond the end."""
+    contacts = (*half_a_box(), contact(0.025, 0.022, 0, 1), contact(0.025, -0.022, 0, -1))
+    outline = outline_of(contacts, R)
+    box = Candidate(1, outline.contour, 0.018, 0.4, contacts)
+    mine = ring(0.09, 0.0, 0.03, [0.0, 60.0, 120.0, 240.0, 300.0])
+    assert of_another((box,), R, mine, contact(0.04, 0.005, 1, 0))
+    assert not of_another((box,), R, mine, ring(0.09, 0.0, 0.03, [180.0])[0])
