@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import _thread
+import signal
 import sys
 import threading
 
@@ -20,6 +20,7 @@ def repeat_lost_interrupts() -> None:
 
 def _on_unraisable(lost: sys.UnraisableHookArgs) -> None:
     if lost.exc_type is KeyboardInterrupt:
-        threading.Timer(AGAIN_S, _thread.interrupt_main).start()
+        # A signal to the main thread also ends its wait for a lock or an event.
+        threading.Timer(AGAIN_S, signal.pthread_kill, (threading.main_thread().ident, signal.SIGINT)).start()
     else:
         sys.__unraisablehook__(lost)
