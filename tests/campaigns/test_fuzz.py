@@ -35,6 +35,7 @@ def test_a_trial_is_the_same_whenever_it_is_made() -> None:
         assert drawn(SEED, n) == drawn(SEED, n)
 
 
+@pytest.mark.study
 def test_a_document_does_not_depend_on_those_before_it() -> None:
     before = deepcopy(ODD_VALUES)
     first = [drawn(1, n)[1] for n in range(1500)]

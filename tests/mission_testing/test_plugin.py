@@ -70,6 +70,7 @@ def test_without_options_nothing_is_said(folder: pytest.Pytester) -> None:
     assert done.ret == 0
 
 
+@pytest.mark.study
 def test_workers_send_what_they_have_seen(folder: pytest.Pytester) -> None:
     folder.makepyfile(STRONG)
     one = folder.runpytest_inprocess("--glotouch-coverage").stdout.str()

@@ -208,6 +208,7 @@ def refine(world: PlanarWorld, before: OutlineTrace, moves: list[tuple[Move, Mov
     return drive(trace_more(before.contacts, world.tip_K_m, TIP, rule, half_extent_m=INNER), Watched().execute)
 
 
+@pytest.mark.study
 def test_refining_finds_every_limb(world_of: WorldOf) -> None:
     """A coarse trace that went round part of it leaves limbs that nothing predicts; the hull's centre needs them all.
 

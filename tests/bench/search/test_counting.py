@@ -33,6 +33,7 @@ def test_figures_of_made_up_rows() -> None:
     assert out["stated"]["brier"]["mean"] == pytest.approx(np.mean(squares))
 
 
+@pytest.mark.study
 def test_a_campaign_states_a_chance_at_every_moment(tmp_path) -> None:
     campaign = CountCampaign(seeds=(300,), out=tmp_path / "out", left_below=0.5)
     rows: list[Any] = []

@@ -95,6 +95,7 @@ def test_a_monitor_sees_the_run(folder: Path) -> None:
     assert "done  nap" in out
 
 
+@pytest.mark.study
 def test_the_record_has_the_same_bytes_with_and_without_monitors(folder: Path) -> None:
     port = two_ports()
     without = done(folder, "run", "middle.yaml", "--out", "a")
@@ -115,6 +116,7 @@ def test_the_record_has_the_same_bytes_with_and_without_monitors(folder: Path) -
     assert sorted(p.name for p in a.iterdir()) == sorted(p.name for p in b.iterdir())
 
 
+@pytest.mark.study
 def test_a_monitor_sees_a_resumed_run(folder: Path) -> None:
     port = two_ports()
     with started(folder, "run", "nap.yaml", "--out", "a", "--groot2", str(port)) as run:
