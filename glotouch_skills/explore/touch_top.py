@@ -78,18 +78,19 @@ class TouchTop(Skill):
         touched_m = float(np.median([c.tip_K_m[2] for c in candidate.contacts])) - tool.floor_z_K_m
         self.measured = replace(candidate, height_m=max(candidate.height_m, touched_m))
         prober = Prober(self.context, tool, GuardParams())
-        top = yield from drive(self._plan(candidate, touched_m), partial(self._make, prober))
+        sides_m = touched_m - (tool.tip_radius_m if tool.round else 0.0)  # a low object meets the lower half of the ball
+        top = yield from drive(self._plan(candidate, sides_m), partial(self._make, prober))
         if top.ball_K_m is None:
             raise self.NO_TOP(
-                f"nothing higher than {touched_m * 1e3:.0f} mm was met where candidate {candidate.index} was traced",
-                sides_m=touched_m,
+                f"nothing higher than {sides_m * 1e3:.0f} mm was met where candidate {candidate.index} was traced",
+                sides_m=sides_m,
             )
         height = float(top.ball_K_m[2]) - tool.tip_radius_m - tool.floor_z_K_m
         self.measured, self.height_m = replace(candidate, height_m=height, top_touched=True), height
         self.event("candidate", candidate=self.measured)  # the final record of this candidate, with its height
         self.event("top", candidate=candidate.index, height_m=height, touches=top.touches, passed=top.passed)
 
-    def _plan(self, candidate: Candidate, touched_m: float) -> TopPlan:
+    def _plan(self, candidate: Candidate, sides_m: float) -> TopPlan:
         p, tool = self.params, self.tool
         # Nearer to the outline than its radius, the ball would pass over free space.
         inset_m = min(max(INSET_SHARE * 0.5 * candidate.contour.size_m[1], tool.tip_radius_m), p.inset_m)
@@ -101,7 +102,7 @@ class TouchTop(Skill):
             candidate.contour.centre_K_m,
             rounds(points, candidate.contour.centre_K_m, rule),
             self._rim(candidate, points),
-            floor + touched_m + tool.tip_radius_m,
+            floor + sides_m + tool.tip_radius_m,
             floor + p.headroom_m,
             rule,
         )

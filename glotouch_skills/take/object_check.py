@@ -23,7 +23,7 @@ class ObjectCheckParams(SkillParams):
 
     A gel yields by its depth at most, so the aperture is between the mesh's width and that width less both depths. It
     was 0.8 to 3.0 mm below the width for 14 of 14 retrieved objects (30 N, gels of 1.5 mm). Densities range from balsa
-    wood to steel, so the weight only excludes the impossible.
+    wood to tungsten, so the weight only excludes the impossible.
     """
 
     target: str = param(
@@ -31,7 +31,7 @@ class ObjectCheckParams(SkillParams):
     )
     width_m: float = param("Largest deviation from that range", unit="m", default=0.0025, gt=0.0, le=0.02)
     lightest_kg_m3: float = param("Least density of the target", unit="kg/m3", default=100.0, gt=0.0)
-    heaviest_kg_m3: float = param("Largest density of the target", unit="kg/m3", default=8000.0, gt=0.0)
+    heaviest_kg_m3: float = param("Largest density of the target", unit="kg/m3", default=20000.0, gt=0.0)
 
 
 class ObjectCheck(Skill):
@@ -84,7 +84,7 @@ class ObjectCheck(Skill):
         if not light <= self.weight_N <= heavy:
             self.impossible = True
             raise self.WRONG_OBJECT(
-                f"{name} weighs {light:.2f} to {heavy:.1f} N, of wood or steel; this weighs {self.weight_N:.2f} N",
+                f"{name} weighs {light:.2f} to {heavy:.1f} N, of wood or tungsten; this weighs {self.weight_N:.2f} N",
                 weight_N=self.weight_N,
                 light_N=light,
                 heavy_N=heavy,

@@ -189,6 +189,14 @@ def test_the_height_of_a_post(make, things) -> None:
     assert b.robot.peak_force_N < 6.0
 
 
+def test_an_object_lower_than_the_ball_s_centre_was(make, things) -> None:
+    """The lower half of the ball met its edge, 20 mm above the floor in the middle."""
+    b, skill = make([things.post(POST, RADIUS, 0.016)])
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert skill.measured.height_m == pytest.approx(0.016, abs=5e-4)
+
+
 def test_a_chimney_beside_the_middle(make, things) -> None:
     chimney = (POST[0] + 0.014, POST[1] + 0.006)
     b, skill = make([things.post(POST, RADIUS, TOP), things.post(chimney, 0.008, TOP + 0.02)])

@@ -12,7 +12,7 @@ from py_trees.common import Status
 from glotouch_skills.common.planning.grasp_plan import GraspPlan
 from glotouch_skills.take.object_check import ObjectCheck
 
-SIDES_M = (0.050, 0.035, 0.060)  # 105 cm3: 0.10 N of balsa to 8.2 N of steel
+SIDES_M = (0.050, 0.035, 0.060)  # 105 cm3: 0.10 N of balsa to 21 N of tungsten
 PLAN = GraspPlan(0, np.array([0.0, 0.0, 0.03]), 0.0, 0.035, 0.055)
 
 
@@ -61,11 +61,11 @@ def test_object_check__wrong_object__no_such_width(judged, grip_m: float) -> Non
     assert skill.reason.evidence["min_m"] == pytest.approx(least, abs=2e-3)
 
 
-@pytest.mark.parametrize("weight_N", [0.05, 9.0])
+@pytest.mark.parametrize("weight_N", [0.05, 25.0])
 def test_object_check__wrong_object__impossible_weight(judged, weight_N: float) -> None:
     skill = judged(0.035, weight_N)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "wrong_object")
-    light, heavy = (9.81 * d * float(np.prod(SIDES_M)) for d in (100.0, 8000.0))
+    light, heavy = (9.81 * d * float(np.prod(SIDES_M)) for d in (100.0, 20000.0))
     assert skill.reason.evidence["light_N"] == pytest.approx(light, rel=1e-3)
     assert skill.reason.evidence["heavy_N"] == pytest.approx(heavy, rel=1e-3)
 
