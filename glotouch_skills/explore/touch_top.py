@@ -78,7 +78,8 @@ class TouchTop(Skill):
         touched_m = float(np.median([c.tip_K_m[2] for c in candidate.contacts])) - tool.floor_z_K_m
         self.measured = replace(candidate, height_m=max(candidate.height_m, touched_m))
         prober = Prober(self.context, tool, GuardParams())
-        sides_m = touched_m - (tool.tip_radius_m if tool.round else 0.0)  # a low object meets the lower half of the ball
+        # A low object met the lower half of the ball.
+        sides_m = touched_m - (tool.tip_radius_m if tool.round else 0.0)
         top = yield from drive(self._plan(candidate, sides_m), partial(self._make, prober))
         if top.ball_K_m is None:
             raise self.NO_TOP(
