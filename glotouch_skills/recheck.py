@@ -35,7 +35,7 @@ class RecheckParams(SkillParams):
     height_m: float = param("Touching height above the floor", unit="m", default=0.018, ge=0.009, le=0.06)
     moved_m: float = param("Largest displacement of a candidate", unit="m", default=0.006, gt=0.0, le=0.02)
     slip_m: float = param("Largest change of the floor's height", unit="m", default=0.002, gt=0.0, le=0.005)
-    headroom_m: float = param("Height of the tool above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.2)
+    headroom_m: float = param("Height of the tool above the floor on the way", unit="m", default=0.15, ge=0.05, le=0.2)
     may_be_gone: bool = param("The probe may have been put back meanwhile", default=False)
     touch: bool = param("Touch one of the candidates", default=True)
     corner_gap_m: float = param(

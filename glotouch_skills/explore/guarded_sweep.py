@@ -40,7 +40,7 @@ class GuardedSweepParams(SkillParams):
     speed_m_s: float = param("Sweeping speed", unit="m/s", default=0.04, gt=0.0, le=0.08)
     travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
     headroom_m: float = param(
-        "Height of the ball above the floor when crossing objects", unit="m", default=0.13, ge=0.02, le=0.2
+        "Height of the ball above the floor when crossing objects", unit="m", default=0.15, ge=0.02, le=0.2
     )
     wall_gap_m: float = param(
         "Distance of the ball's centre from the walls", unit="m", default=0.012, ge=0.008, le=0.05

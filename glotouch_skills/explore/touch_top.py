@@ -39,7 +39,7 @@ class TouchTopParams(SkillParams):
     inset_m: float = param("Largest distance of the passes inside the outline", unit="m", default=0.010, ge=0.0,
                            le=0.03)  # fmt: skip
     reach_m: float = param("Largest distance of any place from the passes", unit="m", default=0.014, ge=0.003, le=0.05)
-    headroom_m: float = param("Height of the ball above the floor when crossing an object", unit="m", default=0.13,
+    headroom_m: float = param("Height of the ball above the floor when crossing an object", unit="m", default=0.15,
                               ge=0.02, le=0.2)  # fmt: skip
 
 

@@ -33,7 +33,7 @@ class GraspParams(SkillParams):
         "Speed of the descent beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04
     )
     headroom_m: float = param(
-        "Height of the fingertips above the floor on the way", unit="m", default=0.14, ge=0.05, le=0.25
+        "Height of the fingertips above the floor on the way", unit="m", default=0.15, ge=0.05, le=0.25
     )
     side_gap_m: float = param("Least gap between open jaw and object", unit="m", default=0.005, ge=0.001, le=0.03)
     min_aperture_m: float = param(

@@ -65,7 +65,7 @@ class ClosureParams(SkillParams):
         "Speed of the descent beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04
     )
     headroom_m: float = param(
-        "Height of the fingertips above the floor on the way", unit="m", default=0.13, ge=0.05, le=0.25
+        "Height of the fingertips above the floor on the way", unit="m", default=0.14, ge=0.05, le=0.25
     )
     settle_s: float = param("Duration of measuring the plateau", unit="s", default=0.15, ge=0.05, le=1.0)
     top_overlap_m: float = param(

@@ -62,7 +62,7 @@ class ExploringSpeeds:
     travel_m_s: float = 0.25
     lower_m_s: float = 0.02
     height_m: float = 0.018
-    headroom_m: float = 0.13
+    headroom_m: float = 0.15
 
 
 def drive(plan: Generator[_Move, _Outcome, T], make: Callable[[_Move], Motion[_Outcome]]) -> Motion[T]:

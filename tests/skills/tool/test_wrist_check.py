@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
+from glotouch_skills.common.hand.retract import CLEAR_M
 from glotouch_skills.tool.tare import TareWrist
 from glotouch_skills.tool.wrist_check import WristCheck
 
@@ -36,7 +37,7 @@ def test_within_bounds(make, pull_N: float) -> None:
     skill = b.make(WristCheck)
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
-    assert fingertips_m(b) == pytest.approx(0.13, abs=1e-3), "it was looked at in free air"
+    assert fingertips_m(b) == pytest.approx(CLEAR_M, abs=1e-3), "it was looked at in free air"
 
 
 @pytest.mark.parametrize("pull_N", [0.55, -3.0, float("nan")])
