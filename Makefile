@@ -18,7 +18,7 @@ test: $(VENV)/.dev
 test-integration: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not study" tests/integration
 
-# Benches on a small scale, whole: minutes of work that shows little more than the tests of their parts. Not in .ci/run.
+# Slow tests, among them whole benches on a small scale: minutes that show little more than the tests of their parts. Not in .ci/run.
 test-studies: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m study
 

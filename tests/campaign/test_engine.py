@@ -101,6 +101,7 @@ def test_two_commands_share_the_trials_of_one_folder(tmp_path: Path, monkeypatch
     assert journal(tmp_path).count("begin") == journal(tmp_path).count("end") == 30
 
 
+@pytest.mark.study
 def test_the_shards_are_the_whole(tmp_path: Path) -> None:
     whole = rows_of(tmp_path / "whole", {}, count=7)
     for index in (1, 2, 3):

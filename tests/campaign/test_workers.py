@@ -130,6 +130,7 @@ def test_workers_end_with_a_killed_parent(parent: subprocess.Popen[str]) -> None
     wait_for(lambda: all(map(gone, workers)))
 
 
+@pytest.mark.study
 def test_five_times_ctrl_c_in_a_bench(tmp_path: Path) -> None:
     words = [
         sys.executable,

@@ -33,6 +33,7 @@ def shown(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("group", ["reference", "results", "architecture"])
 def test_generated_pages_are_up_to_date(group: str) -> None:
     environment = os.environ | {"PYTHONPATH": str(ROOT)}

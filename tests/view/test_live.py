@@ -63,6 +63,7 @@ def test_the_record_has_the_same_bytes_with_and_without_a_live_page(nap: Path) -
     assert without.stdout.split("in ")[0] == live.stdout.split("in ")[0]
 
 
+@pytest.mark.study
 def test_a_record_that_is_watched_is_not_changed(nap: Path) -> None:
     run(nap, "a")
     folder = nap.parent / "a"

@@ -21,6 +21,8 @@ from glotouch_bt.perception.touch import Layer, TouchSet
 from glotouch_bt.robot import BadInput
 from tests.support.relief_pairs import pair
 
+pytestmark = pytest.mark.study
+
 SEED = 4
 
 

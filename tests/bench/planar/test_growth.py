@@ -30,6 +30,7 @@ def test_a_slope_needs_complete_explorations() -> None:
     assert np.isnan(slopes(rows, "travel_m")["area"])
 
 
+@pytest.mark.study
 def test_all_objects_are_found_in_a_larger_box(tmp_path: Path) -> None:
     found = growth_row(GrowthCampaign(seeds=(1,), out=tmp_path, policy="nearest_frontier"), 6, 1.5, 1)
     assert (found["ended"], found["found"]) == ("complete", 6)

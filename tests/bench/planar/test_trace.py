@@ -145,6 +145,7 @@ def test_a_contact_that_faces_the_middle_is_with_something_else(world_of: WorldO
     np.testing.assert_allclose(result.contour.centre_K_m, centres_of(world)[0], atol=5e-4)
 
 
+@pytest.mark.study
 def test_what_moved_unfelt_is_traced_anew(world_of: WorldOf) -> None:
     """Something shoved it by 7 to 12 mm after it had been traced coarsely; what nobody moved is left in peace.
 

@@ -20,6 +20,7 @@ tree:
 """
 
 
+@pytest.mark.study
 def test_forty_mistakes_behind_an_exploration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The probe is put back for ever: each time but the first it is wrong, and long after the start."""
     kept: list[StepBudget] = []

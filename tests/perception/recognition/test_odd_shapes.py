@@ -50,6 +50,7 @@ def test_the_narrowest_way_through(meshes) -> None:
     assert TargetModel.from_mesh(meshes["mushroom"]).narrowest_m == pytest.approx(0.022, abs=2e-3)
 
 
+@pytest.mark.study
 def test_every_shape_knows_itself_among_all(meshes) -> None:
     names = [n for n in meshes if n != "wide"]
     touched = [acquire(meshes[n], POSE, IDEAL, np.random.default_rng(i), i)[0] for i, n in enumerate(names)]

@@ -78,6 +78,7 @@ def test_uncertainty_grows_with_the_distance_from_what_was_felt(solids) -> None:
     assert certainty.image_known[i, len(model.l_m) // 2, above][-1] < 1e-3
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("shape", range(5))
 def test_the_true_widths_lie_within_the_stated_uncertainty(meshes, shape: int) -> None:
     """The truth is the mesh's own table of ray casts; its frame is that of the touches, because both poses are 0."""

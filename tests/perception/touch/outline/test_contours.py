@@ -116,6 +116,7 @@ def test_traced_discs(bench, noise):
         assert abs(c.size_m[0] - 2 * radius) < 4 * noise
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("height", [0.015, 0.018, 0.025])
 def test_kind_of_real_footprints_follows_their_fill(bench, height):
     """Every mesh of the mission, touched by a ball on a shaft: what fills its rectangle is a box, the rest round.
