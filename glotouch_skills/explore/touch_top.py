@@ -58,7 +58,7 @@ class TouchTop(Skill):
 
     NO_TOP = Failure(
         "no_top",
-        "nothing was met above the height at which the sides were touched: the object was moved or is gone; "
+        "nothing was met above the lowest point of the ball at its side contacts: the object was moved or is gone; "
         "`measured` is the candidate, at least that high",
         advice="trace it again: it was moved or is gone",
     )

@@ -84,7 +84,8 @@ class ObjectCheck(Skill):
         if not light <= self.weight_N <= heavy:
             self.impossible = True
             raise self.WRONG_OBJECT(
-                f"{name} weighs {light:.2f} to {heavy:.1f} N, of wood or tungsten; this weighs {self.weight_N:.2f} N",
+                f"{name} would weigh {light:.2f} N (balsa wood) to {heavy:.1f} N (tungsten); "
+                f"this weighs {self.weight_N:.2f} N",
                 weight_N=self.weight_N,
                 light_N=light,
                 heavy_N=heavy,

@@ -57,9 +57,10 @@ def test_a_bomb_is_bad_input(tmp_path: Path, what: str) -> None:
 
 def test_too_many_messages_are_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mcap_chunks, "MAX_ITEMS", 40_000)
-    record(tmp_path / "run.mcap", chunk(struct.pack("<BQ", 3, 0) * 40_001))
-    with pytest.raises(TooLarge, match="unpacks to"):
-        read_run(tmp_path)
+    path = record(tmp_path / "run.mcap", chunk(struct.pack("<BQ", 3, 0) * 40_001))
+    for read in (read_run, write_report, lambda folder: list(read_chunks(folder / "run.mcap", path.stat().st_size))):
+        with pytest.raises(TooLarge, match="unpacks to"):
+            read(tmp_path)
 
 
 UNKNOWN_CHANNEL = b"\x05" + struct.pack("<Q", 30) + struct.pack("<HIQQ", 99, 0, 0, 0) + bytes(8)
