@@ -49,7 +49,12 @@ class TouchNextParams(ClosureParams):
     target: str = param(
         "The object to find: an STL file, the name of one in the world's object folder, or touched:NAME", names="stl"
     )
-    confidence: float = param("Sufficient probability", default=0.97, gt=0.5, lt=1.0)
+    confidence: float = param(
+        "Sufficient probability that it is the likeliest candidate, if the target is one of them",
+        default=0.97,
+        gt=0.5,
+        lt=1.0,
+    )
     unmeasured: bool = param("Touch candidates that the probe did not measure, too", default=False)
     min_gain_nats: float = param(
         "Smallest expected gain of a closure", default=0.02, ge=0.0, formerly="least_gain_nats"
