@@ -7,7 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glotouch_bt.perception.recognition import ProbeOption, ProbeTouch, TargetModel, excluded, next_probe_touch
+from glotouch_bt.perception.recognition import (
+    ProbeOption,
+    ProbeTouch,
+    TargetModel,
+    enough,
+    excluded,
+    next_probe_touch,
+)
 from glotouch_bt.perception.recognition.likelihood import Belief, expected_gain, infer_belief
 from glotouch_bt.perception.recognition.schedule import CHANGE_S, pays_now
 from glotouch_bt.perception.touch import Candidate, TouchSet
@@ -135,3 +142,20 @@ def test_time_counts(target, model) -> None:
 def test_an_unknown_candidate_is_an_error(target, model) -> None:
     with pytest.raises(ParamError, match=r"touch\.candidate"):
         expected_gain(believed(model, candidate(target, 0)), [ProbeTouch(5, "top")])
+
+
+@pytest.mark.parametrize(
+    ("target_p", "rival_p", "absent_p", "sure"),
+    [
+        (0.975, 0.010, 0.015, True),
+        (0.905, 0.005, 0.090, True),  # known which one; turned by closures, it fits no target well
+        (0.890, 0.005, 0.105, False),  # perhaps none of them
+        (0.960, 0.035, 0.005, False),  # perhaps the other one
+    ],
+)
+def test_which_one_and_whether_any_are_separate_questions(model, target, target_p, rival_p, absent_p, sure) -> None:
+    belief = believed(model, candidate(target, 0), candidate(target, 1))
+    given = zip(belief.ranking.matches, (target_p, rival_p), strict=True)
+    matches = tuple(replace(m, probability=p, evidence=2.0) for m, p in given)
+    belief = replace(belief, ranking=replace(belief.ranking, matches=matches, p_absent=absent_p))
+    assert bool(enough(belief, 0.97, frozenset())) is sure
