@@ -28,6 +28,7 @@ def survey(objects: Path, out: Path, place: list[float], expected: int) -> RunRe
     return launch(RunRequest("survey", seed=5, settings=settings, objects=objects, out=out))
 
 
+@pytest.mark.study
 def test_an_empty_container_is_searched_and_said_to_be_empty(block: Path, tmp_path: Path) -> None:
     done = survey(block, tmp_path / "run", OUTSIDE, 1)
     assert (done.exit_code, done.result["status"]) == (1, "failure")

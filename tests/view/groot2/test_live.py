@@ -144,6 +144,7 @@ def test_a_finished_run_is_shown_too(folder: Path, done: Callable[..., Result]) 
     assert {p.name: (p.read_bytes(), p.stat().st_mtime_ns) for p in (folder / "a").iterdir()} == before
 
 
+@pytest.mark.study
 def test_a_free_monitor_shows_the_run(folder: Path) -> None:
     port, python = two_ports(), btcpp_python()
     more = "".join(f"  - wait: {{name: longer {i}, seconds: 800.0}}\n" for i in range(9))
