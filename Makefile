@@ -4,26 +4,30 @@ VENV := .venv
 BIN := $(VENV)/bin
 export MPLBACKEND := Agg
 
-.PHONY: demo dev test test-integration test-studies test-browser check format docs reference results-page pins clean
+.PHONY: demo dev test test-integration test-all test-studies test-browser check format docs reference results-page pins clean
 
 demo: $(VENV)
 	$(BIN)/glotouch run retrieve --set target=apple --seed 0
 	@echo "next: source $(BIN)/activate, then: glotouch run calibrate --live"
 
 # Quick tests: no whole mission in MuJoCo, no browser.
-test: $(VENV)/.dev
+test: $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not study" --ignore=tests/integration --ignore=tests/browser
 
 # Whole missions, backends and conformance in MuJoCo and on simulated devices, for which some tests wait.
-test-integration: $(VENV)/.dev
+test-integration: $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not study" tests/integration
 
+# Both of them in one session: one start, and no core idle while the last test of either ends.
+test-all: $(VENV)/.compiled
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not study" --ignore=tests/browser
+
 # Slow tests, among them whole benches on a small scale: minutes that show little more than the tests of their parts. Not in .ci/run.
-test-studies: $(VENV)/.dev
+test-studies: $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m study
 
 # The pages in Chromium: needs chromium and chromium-driver (Debian's packages).
-test-browser: $(VENV)/.dev
+test-browser: $(VENV)/.compiled
 	GLOTOUCH_REQUIRE_BROWSER=1 $(BIN)/python -m pytest -n 2 tests/browser
 
 check: $(VENV)/.dev
@@ -44,6 +48,11 @@ $(VENV): requirements.txt pyproject.toml
 $(VENV)/.dev: $(VENV) requirements-dev.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.txt
 	touch $(VENV)/.dev
+
+# The machine code of the numerical loops: tests that start many processes would compile it in each.
+$(VENV)/.compiled: $(VENV)/.dev
+	$(BIN)/python tests/support/compile_all.py
+	touch $(VENV)/.compiled
 
 # Everything that development needs, pytest included.
 dev: $(VENV)/.dev

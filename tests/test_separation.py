@@ -6,8 +6,6 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 from glotouch_bt.robot.scene import AXES
 
 ROOT = Path(__file__).parents[1]
@@ -36,20 +34,17 @@ def names_in(path: Path) -> Iterator[str]:
             yield node.value
 
 
-@pytest.mark.parametrize("path", sources(*METHOD), ids=lambda p: str(p.relative_to(ROOT)))
-def test_the_method_reads_no_conditions(path: Path) -> None:
+def test_the_method_reads_no_conditions_and_is_not_told_how_objects_are_placed() -> None:
     """Neither the class, nor a profile, nor an axis by name, nor a module of the simulated sensors."""
-    used = set(names_in(path))
-    assert used.isdisjoint({"Conditions", "load_conditions", "conditions_of", *AXES})
-    assert not any("glotouch_missions/conditions" in u or u.startswith("glotouch_backends") for u in used)
+    conditions = {"Conditions", "load_conditions", "conditions_of", *AXES}
+    placing = {"min_gap_m", "min_wall_gap_m", "draw_stance", "draw_layout"}
+    for path in sources(*METHOD):
+        used = set(names_in(path))
+        assert used.isdisjoint(conditions | placing), path
+        assert not any("glotouch_missions/conditions" in u or u.startswith("glotouch_backends") for u in used), path
 
 
-@pytest.mark.parametrize("path", sources(*METHOD), ids=lambda p: str(p.relative_to(ROOT)))
-def test_the_method_is_not_told_how_objects_are_placed(path: Path) -> None:
-    assert set(names_in(path)).isdisjoint({"min_gap_m", "min_wall_gap_m", "draw_stance", "draw_layout"})
-
-
-@pytest.mark.parametrize("path", sources(*SIMULATOR), ids=lambda p: str(p.relative_to(ROOT)))
-def test_the_simulator_reads_no_beliefs(path: Path) -> None:
-    modules = [n for n in names_in(path) if n.startswith("glotouch_")]
-    assert not [m for m in modules if m.startswith(("glotouch_skills", "glotouch_bt.perception", "glotouch_bt.motion"))]
+def test_the_simulator_reads_no_beliefs() -> None:
+    beliefs = ("glotouch_skills", "glotouch_bt.perception", "glotouch_bt.motion")
+    for path in sources(*SIMULATOR):
+        assert not [n for n in names_in(path) if n.startswith(beliefs)], path

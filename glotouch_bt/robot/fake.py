@@ -13,6 +13,7 @@ from math import acos, atan2, hypot, pi
 import numpy as np
 import numpy.typing as npt
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.errors import BadInput, ParamError, SafetyStop
 from glotouch_bt.robot.command import Command, GripperTarget, PendingTicket, Request, SetPayload
 from glotouch_bt.robot.description import Box, Capsule, Gripper, Joint, Link, RobotDescription, forward
@@ -93,6 +94,44 @@ def _turned(quat: Array, vector: Array) -> Array:
     return np.asarray(vector + 2.0 * np.cross(u, w * vector + np.cross(u, vector)), dtype=np.float64)
 
 
+@compiled("given f8[:]", "given f8[:]", "given f8[::1]")
+def _between(before: Array, after: Array, share: Array) -> Array:
+    """Return the rows (n, k) on the way from one vector (k,) to another, at shares (n,) of it."""
+    out = np.zeros((len(share), len(before)))
+    for i in range(len(share)):
+        for k in range(len(before)):
+            out[i, k] = before[k] + share[i] * (after[k] - before[k])
+    return out
+
+
+@compiled("given f8[:]", "given f8[:]", "given f8[::1]")
+def _turned_by(before: Array, after: Array, share: Array) -> Array:
+    """Return the unit quaternions (n, 4) on the shorter way from one (4,) to another, at shares (n,) of the chord."""
+    dot = 0.0
+    for k in range(4):
+        dot += before[k] * after[k]
+    sign = 1.0 if dot >= 0.0 else -1.0
+    out = np.zeros((len(share), 4))
+    for i in range(len(share)):
+        square = 0.0
+        for k in range(4):
+            out[i, k] = before[k] + share[i] * (sign * after[k] - before[k])
+            square += out[i, k] * out[i, k]
+        out[i] /= np.sqrt(square)
+    return out
+
+
+@compiled("given f8[:, :]")
+def _norms(wrench: Array) -> Array:
+    """Return the norms (n, 2) of force and torque of wrenches (n, 6)."""
+    out = np.zeros((len(wrench), 2))
+    for i in range(len(wrench)):
+        for j in range(2):
+            x, y, z = wrench[i, 3 * j], wrench[i, 3 * j + 1], wrench[i, 3 * j + 2]
+            out[i, j] = np.sqrt(x * x + y * y + z * z)
+    return out
+
+
 @dataclass(frozen=True)
 class SpringWall:
     """A frictionless elastic half space.
@@ -161,10 +200,11 @@ class FakeRobot(Robot):
         self.walls, self.wrench, self.grip_width_m = tuple(walls), wrench, grip_width_m
         self._tip_P = frozen_array("tip_P_m", tip_P_m, (3,))
         self._tip_radius = tip_radius_m
+        self._hard = np.array([self.limits.hard_force_N, self.limits.hard_torque_Nm])
         self.cycles = 0
         self.peak_force_N = 0.0
         self.commands: list[Command] = []
-        self._samples = samples
+        self._share = np.arange(1, samples + 1) / samples
         self._frame_s = 1.0 / frame_rate_Hz
         self._next_frame_s = 0.0
         self._q = np.array(description.home_q)
@@ -220,11 +260,12 @@ class FakeRobot(Robot):
     def _check(self, q: Array) -> None:
         if q.shape != self._lower.shape or not np.isfinite(q).all():
             raise ParamError("command.motion.q", q.tolist(), f"{len(self._lower)} finite numbers")
-        out = np.flatnonzero((q < self._lower - 1e-9) | (q > self._upper + 1e-9))
-        if len(out):
-            joint = self.description.joints[int(out[0])]
+        out = (q < self._lower - 1e-9) | (q > self._upper + 1e-9)
+        if out.any():
+            i = int(out.argmax())
+            joint = self.description.joints[i]
             valid = f"within {joint.lower_rad}..{joint.upper_rad} rad"
-            raise ParamError(f"command.motion.q[{joint.name}]", float(q[out[0]]), valid)
+            raise ParamError(f"command.motion.q[{joint.name}]", float(q[i]), valid)
 
     def _grip(self) -> GripperState:
         """Move the jaws for one period and return their report."""
@@ -249,17 +290,15 @@ class FakeRobot(Robot):
     def _block(
         self, begin_s: float, q: Array, pose: Pose, state: GripperState, frame: TactileFrame | None
     ) -> Observation:
-        share = np.arange(1, self._samples + 1)[:, None] / self._samples
-        stamp = begin_s + share[:, 0] * self.period_s
-        position = self._pose.position_m + share * (pose.position_m - self._pose.position_m)
-        goal = pose.quat if float(pose.quat @ self._pose.quat) >= 0 else -pose.quat
-        quat = self._pose.quat + share * (goal - self._pose.quat)
-        quat /= np.linalg.norm(quat, axis=1, keepdims=True)
-        joints = self._q + share * (q - self._q)
-        speed = np.broadcast_to((q - self._q) / self.period_s, joints.shape)
+        before, share = self._pose, self._share
+        stamp = begin_s + share * self.period_s
+        position = _between(before.position_m, pose.position_m, share)
+        quat = _turned_by(before.quat, pose.quat, share)
+        joints = _between(self._q, q, share)
+        speed = np.repeat(((q - self._q) / self.period_s)[None], len(share), axis=0)
         raw = self._felt(stamp, position, quat) if self.wrench is None else self.wrench(stamp, position, quat)
         self._raw = raw
-        self.peak_force_N = max(self.peak_force_N, float(np.linalg.norm(raw[:, :3], axis=1).max()))
+        self.peak_force_N = max(self.peak_force_N, float(_norms(raw)[:, 0].max()))
         return Observation(stamp, joints, speed, position, quat, raw - self._bias, state, frame)
 
     def _felt(self, stamp: Array, position: Array, quat: Array) -> Array:
@@ -285,17 +324,14 @@ class FakeRobot(Robot):
             self._tare = None
 
     def _enforce(self) -> None:
-        wrench, limits = self._newest.wrench_S, self.limits
-        for name, part, limit in (
-            ("force_N", wrench[:, :3], limits.hard_force_N),
-            ("torque_Nm", wrench[:, 3:], limits.hard_torque_Nm),
-        ):
-            norm = np.linalg.norm(part, axis=1)
-            over = np.flatnonzero(norm > limit)
-            if len(over):
-                i = int(over[0])
-                self._stop = SafetyStop(name, float(norm[i]), limit, float(self._newest.stamp_s[i]))
-                raise self._stop
+        norms = _norms(self._newest.wrench_S)
+        over = norms > self._hard
+        if over.any():
+            j = int(over.any(axis=0).argmax())
+            i = int(over[:, j].argmax())
+            name, limit = ("force_N", "torque_Nm")[j], float(self._hard[j])
+            self._stop = SafetyStop(name, float(norms[i, j]), limit, float(self._newest.stamp_s[i]))
+            raise self._stop
 
 
 class FakeBackend(Backend):

@@ -368,7 +368,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run
 
 
-@pytest.mark.parametrize("redirected", ["2> >(true)", "> >(true)", "2> /dev/full", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("redirected", ["> >(true) 2> >(true)", "2> /dev/full", "<&- >&- 2>&-"])
 def test_a_reader_that_has_gone_takes_no_mission_with_it(tmp_path: Path, redirected: str, plain: Path) -> None:
     cut = tmp_path / "cut"
     assert _of_fake_run(cut, redirected) == 1

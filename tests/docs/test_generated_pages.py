@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 import glotouch_bt as gt
-from glotouch_bt.claims import read_claims
+from glotouch_bt.claims import Claim, read_claims
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("docs/**/*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
@@ -72,9 +72,14 @@ def test_every_page_is_in_the_navigation() -> None:
     assert listed == {str(p.relative_to(ROOT / "docs")) for p in ROOT.glob("docs/**/*.md")}
 
 
+@pytest.fixture(scope="module")
+def claims() -> dict[str, Claim]:
+    return read_claims()
+
+
 @pytest.mark.parametrize("meta", sorted(ROOT.glob("docs/results/*/meta.yaml")), ids=lambda p: p.parent.name)
-def test_every_claim_names_command_commit_conditions_and_seeds(meta: Path) -> None:
-    claim = read_claims().get(meta.parent.name)
+def test_every_claim_names_command_commit_conditions_and_seeds(meta: Path, claims: dict[str, Claim]) -> None:
+    claim = claims.get(meta.parent.name)
     entry = {} if claim is None else claim.model_dump(exclude_defaults=True)
     given = entry | yaml.safe_load(meta.read_text(encoding="utf-8"))
     assert all(

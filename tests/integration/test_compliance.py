@@ -34,7 +34,7 @@ def deflection_m_N(conditions: str) -> list[float]:
     return found
 
 
-@pytest.mark.parametrize("conditions", ["nominal", "realistic"])
+@pytest.mark.parametrize("conditions", [pytest.param("nominal", marks=pytest.mark.study), "realistic"])
 def test_the_measured_compliance_is_that_of_the_held_probe(conditions: str, tmp_path: Path) -> None:
     done = launch(RunRequest("calibrate", seed=SEED, conditions=conditions, out=tmp_path / "run"))
     assert done.status == "success"

@@ -26,7 +26,7 @@ SCHEMA = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def cache(tmp_path_factory: pytest.TempPathFactory):
     """Hulls computed here stay here."""
     with pytest.MonkeyPatch.context() as patch:

@@ -28,6 +28,7 @@ def survey(objects: Path, out: Path, place: list[float], expected: int) -> RunRe
     return launch(RunRequest("survey", seed=5, settings=settings, objects=objects, out=out))
 
 
+@pytest.mark.study
 def test_an_empty_container_is_searched_and_said_to_be_empty(block: Path, tmp_path: Path) -> None:
     done = survey(block, tmp_path / "run", OUTSIDE, 1)
     assert (done.exit_code, done.result["status"]) == (1, "failure")
@@ -38,7 +39,7 @@ def test_an_empty_container_is_searched_and_said_to_be_empty(block: Path, tmp_pa
     )
 
 
-@pytest.mark.parametrize("yaw", [0.0, 0.4])
+@pytest.mark.parametrize("yaw", [pytest.param(0.0, marks=pytest.mark.study), 0.4])
 def test_an_object_against_a_wall_is_found(block: Path, tmp_path: Path, yaw: float) -> None:
     """Two millimetres from the wall the ball cannot go round it; what can be touched says where it is."""
     reach = 0.5 * (BLOCK_M[0] * np.cos(yaw) + BLOCK_M[1] * np.sin(yaw))
@@ -51,6 +52,7 @@ def test_an_object_against_a_wall_is_found(block: Path, tmp_path: Path, yaw: flo
     assert candidate["height_m"] == pytest.approx(BLOCK_M[2], abs=0.002)
 
 
+@pytest.mark.study
 def test_an_object_in_a_corner_ends(block: Path, tmp_path: Path) -> None:
     x, y = 0.15 - 0.002 - 0.5 * BLOCK_M[0], 0.2 - 0.002 - 0.5 * BLOCK_M[1]
     done = survey(block, tmp_path / "run", [x, y, 0.0], 1)

@@ -30,6 +30,7 @@ from glotouch_bt.robot import (
     Robot,
     World,
     cross_matrix,
+    quat_to_matrix,
 )
 from glotouch_bt.robot.fake import FakeRobot, forward
 from glotouch_bt.skill import Context, Skill
@@ -63,6 +64,8 @@ def post(centre_m: tuple[float, float], radius_m: float, top_m: float) -> Thing:
         away = np.linalg.norm(offset, axis=1)
         side, above = radius_m + radius - away, top_m + radius - ball[:, 2]
         inside = (side > 0) & (above > 0)
+        if not inside.any():
+            return out
         up = inside & (above < side)
         out[up, 2] = STIFFNESS_N_M * above[up]
         out_of = inside & ~up
@@ -78,7 +81,7 @@ class BenchRobot(FakeRobot):
     Args:
         world: Its container and probe.
         things: What the ball (at `tip_P_m`) touches.
-        weight_N: Weight in the hand for a position (3,) of P in B and an aperture, m.
+        weight_N: Weight in the hand for a position (3,) of P in B and an aperture, m; None for nothing.
         moment_S_Nm: (3,) felt always, of what hangs aside.
     """
 
@@ -86,12 +89,14 @@ class BenchRobot(FakeRobot):
         self,
         world: World,
         things: Sequence[Thing] = (),
-        weight_N: Callable[[Array, float], float] = lambda position, aperture: 0.0,
+        weight_N: Callable[[Array, float], float] | None = None,
         tip_P_m: float = 0.13,
         grip_width_m: float | None = None,
         moment_S_Nm: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> None:
         self.world, self.things, self.weight_N, self.tip_P_m = world, things, weight_N, tip_P_m
+        self.pose_K_B, self.tip_P = world.container.pose_B_K.inverse(), np.array([0.0, 0.0, tip_P_m])
+        self.rotation_K_B = self.pose_K_B.rotation
         self.moment_S_Nm = np.asarray(moment_S_Nm)
         self.speed_rad_s = np.zeros(7)
         self.velocity_B: Array | None = None
@@ -114,23 +119,26 @@ class BenchRobot(FakeRobot):
         return super().cycle(command)
 
     def _all_felt(self, stamp: Array, position: Array, quat: Array) -> Array:
-        pose, wrench = Pose(position[-1], quat[-1]), np.zeros((len(stamp), 6))
+        rotation, wrench = quat_to_matrix(quat[-1]), np.zeros((len(stamp), 6))
         if self.things:
-            K = self.world.container.pose_B_K
-            ball = K.inverse().apply(position + pose.rotation @ np.array([0.0, 0.0, self.tip_P_m]))
-            contact = sum(t(ball, 0.006) for t in self.things) @ K.rotation.T @ pose.rotation
+            ball = self.pose_K_B.apply(position + rotation @ self.tip_P)
+            force_K = self.things[0](ball, 0.006)
+            for thing in self.things[1:]:
+                force_K = force_K + thing(ball, 0.006)
+            contact = force_K @ (self.rotation_K_B @ rotation)
             wrench[:, :3], wrench[:, 3:] = contact, contact @ self.lever_S.T
-        down_S = -pose.rotation[2]
-        wrench[:, :3] += np.array([self.weight_N(p, self._aperture) for p in position])[:, None] * down_S
+        if self.weight_N is not None:
+            wrench[:, :3] -= np.array([self.weight_N(p, self._aperture) for p in position])[:, None] * rotation[2]
         wrench[:, 3:] += self.moment_S_Nm
-        return wrench + self._inertial(position, pose, float(stamp[-1] - stamp[0]))
+        wrench += self._inertial(position, rotation, float(stamp[-1] - stamp[0]))
+        return wrench
 
-    def _inertial(self, position: Array, pose: Pose, span_s: float) -> Array:
+    def _inertial(self, position: Array, rotation: Array, span_s: float) -> Array:
         """(6,) what the hand with the probe feels of the change of velocity since the last period."""
         velocity = (position[-1] - position[0]) / span_s
         change = velocity - (velocity if self.velocity_B is None else self.velocity_B)
         self.velocity_B = velocity
-        return np.asarray(self.hand.wrench_S(pose.rotation.T @ change / self.period_s))
+        return np.asarray(self.hand.wrench_S(change @ rotation / self.period_s))
 
 
 class Bench:

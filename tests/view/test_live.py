@@ -16,11 +16,15 @@ import pytest
 
 pytest.importorskip("viser")
 
+from typer.testing import CliRunner
+
+from glotouch_bt import cli
 from glotouch_bt.mission.execution import Control
 from glotouch_bt.robot import BadInput
 from glotouch_bt.view import LiveView
 from glotouch_bt.view import live as live_file
 from glotouch_bt.view import process as process_file
+from tests.support.fake_cli import install_fakes
 
 FAKE_CLI = Path(__file__).parents[1] / "support" / "fake_cli.py"
 NAP = """
@@ -61,6 +65,7 @@ def test_the_record_has_the_same_bytes_with_and_without_a_live_page(nap: Path) -
     assert (a / "run.mcap").read_bytes() == (b / "run.mcap").read_bytes()
     assert sorted(p.name for p in a.iterdir()) == sorted(p.name for p in b.iterdir())
     assert without.stdout.split("in ")[0] == live.stdout.split("in ")[0]
+    assert live.stderr.endswith("nobody had the page open; look at it with: glotouch view b\n")
 
 
 @pytest.mark.study
@@ -83,15 +88,12 @@ def test_a_record_that_is_watched_is_not_changed(nap: Path) -> None:
     assert {p.name: (p.read_bytes(), p.stat().st_mtime_ns) for p in folder.iterdir()} == before
 
 
-def test_a_page_that_nobody_opened_is_told(nap: Path) -> None:
-    done = run(nap, "a", "--live", "--no-browser")
-    assert done.stderr.endswith("nobody had the page open; look at it with: glotouch view a\n")
-
-
-def test_options_of_the_page_need_the_page(nap: Path) -> None:
+def test_options_of_the_page_need_the_page(nap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install_fakes(monkeypatch.setattr)
+    monkeypatch.chdir(nap.parent)
     for option in (("--port", "9000"), ("--no-browser",)):
-        done = run(nap, "a", *option)
-        assert done.returncode == 2
+        done = CliRunner().invoke(cli.app, ["run", nap.name, "--out", "a", *option])
+        assert done.exit_code == 2
         assert done.stderr == f"glotouch: {option[0]}: needs --live\n"
         assert not (nap.parent / "a").exists()
 

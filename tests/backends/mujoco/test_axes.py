@@ -40,10 +40,10 @@ def squeeze(robot: MujocoRobot, drive: Drive) -> list[Observation]:
     """Squeeze the block, lift it a little, put it down, and open again."""
     driver = drive(robot)
     driver.jaws(0.070, time_s=0.3)
-    driver.line((0.63, 0.08, -0.165), speed_m_s=0.2)
+    driver.line((0.63, 0.08, -0.165), speed_m_s=0.4)
     for target in (GripperTarget(0.020, 0.1, 10.0), GripperTarget(0.070, 0.1, 10.0)):
         driver.wait(0.7, Command(gripper=target, tactile=True))
-    driver.line((0.63, 0.08, 0.0), speed_m_s=0.2)
+    driver.line((0.63, 0.08, 0.0), speed_m_s=0.4)
     observations: list[Observation] = driver.observations
     return observations
 
@@ -51,7 +51,7 @@ def squeeze(robot: MujocoRobot, drive: Drive) -> list[Observation]:
 def press_floor(robot: MujocoRobot, drive: Drive) -> list[Observation]:
     """Press the fingertips 0.3 mm into the floor."""
     driver = drive(robot)
-    driver.line((0.55, -0.08, -0.17))
+    driver.line((0.55, -0.08, -0.17), speed_m_s=0.4)
     driver.line((0.55, -0.08, -0.1843), speed_m_s=0.02)
     observations: list[Observation] = driver.observations
     return observations
@@ -61,7 +61,7 @@ def photograph(robot: MujocoRobot, drive: Drive) -> list[Observation]:
     """Squeeze the block and take an image of the pads."""
     driver = drive(robot)
     driver.jaws(0.070, time_s=0.3)
-    driver.line((0.63, 0.08, -0.165), speed_m_s=0.2)
+    driver.line((0.63, 0.08, -0.165), speed_m_s=0.4)
     driver.wait(0.6, Command(gripper=GripperTarget(0.020, 0.1, 10.0), tactile=True))
     driver.wait(robot.period_s, Command(images=True))
     driver.wait(0.1)
@@ -159,7 +159,7 @@ def test_a_snapshot_holds_what_the_sensors_remember(open_robot: Open, drive: Dri
     one, other = open_robot(REALISTIC, seed=4), open_robot(REALISTIC, seed=4)
     driver = drive(one)
     driver.jaws(0.070, time_s=0.3)
-    driver.line((0.63, 0.08, -0.165), speed_m_s=0.2)
+    driver.line((0.63, 0.08, -0.165), speed_m_s=0.4)
     driver.wait(0.5, Command(gripper=GripperTarget(0.020, 0.1, 10.0), tactile=True))
     kept = encode(one.snapshot())
     release = [Command(gripper=GripperTarget(0.070, 0.05, 10.0), tactile=True)] * 60

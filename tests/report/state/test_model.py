@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from glotouch_bt import cli
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.record.recorder import Recorder
 from glotouch_bt.report import RecordReader, read_run
 from glotouch_bt.report.state import RunModel, SceneState, planned_nodes
 from glotouch_bt.report.state import model as model_file
 from glotouch_bt.report.state.model import MAX_KEPT, GrowingRows
+from tests.support.fake_cli import install_fakes
 from tests.support.made_run import OBJECTS, TIP_M, WANTED, Made
 
 
@@ -211,7 +212,6 @@ def test_the_target_of_the_ranking_is_said(model: RunModel) -> None:
     assert line.text == f"{OBJECTS[WANTED][0]} accepted"
 
 
-FAKE_CLI = Path(__file__).parents[2] / "support" / "fake_cli.py"
 FULL = """
 mission: full
 world: container_five
@@ -224,11 +224,12 @@ tree:
 """
 
 
-def test_where_a_mission_failed_stays_in_view(tmp_path: Path) -> None:
+def test_where_a_mission_failed_stays_in_view(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A false condition is no event, and the selector resets it before the mission ends."""
     (tmp_path / "full.yaml").write_text(FULL)
-    words = [sys.executable, str(FAKE_CLI), "run", "full.yaml", "--out", "run"]
-    assert subprocess.run(words, cwd=tmp_path, capture_output=True, check=False).returncode == 1
+    install_fakes(monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(cli.app, ["run", "full.yaml", "--out", "run"]).exit_code == 1
     model = read(tmp_path / "run")
     (mark,) = model.marks.values
     assert (mark.kind, mark.tone) == ("failed", "bad")

@@ -148,4 +148,4 @@ def test_guarded_sweep__tool_lost(make, tool) -> None:
 
 
 def test_broken_off_anywhere(make, preempt_all_along) -> None:
-    preempt_all_along(make, 10)
+    preempt_all_along(make, 5)

@@ -100,7 +100,7 @@ def test_squeeze__no_squeeze__fingers_touch_and_rise_again(make, things) -> None
 
 def test_broken_off_anywhere(make, found, preempt_all_along) -> None:
     neighbour = found.round((0.0, -0.12), 0.02, index=1)
-    preempt_all_along(lambda: make(known=(neighbour,), layers=2), 12, finish=False)
+    preempt_all_along(lambda: make(known=(neighbour,), layers=2), 6, finish=False)
 
 
 class Slippery:

@@ -92,4 +92,4 @@ def test_grasp__no_grasp__one_of_the_grasps_was_tried(make) -> None:
 
 
 def test_broken_off_anywhere(make, found, preempt_all_along) -> None:
-    preempt_all_along(lambda: make(known=(found.round((0.01, -0.1), 0.02, index=1),)), 12)
+    preempt_all_along(lambda: make(known=(found.round((0.01, -0.1), 0.02, index=1),)), 6)

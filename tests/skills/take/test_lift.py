@@ -83,4 +83,4 @@ def test_broken_off_anywhere(make, preempt_all_along) -> None:
         assert b.arm.aperture_m == pytest.approx(0.04)
         assert np.isclose(b.context.observation.gripper.force_N, 10.0)
 
-    preempt_all_along(lambda: make(height_m=0.10), 10, after=still_gripping)
+    preempt_all_along(lambda: make(height_m=0.10), 6, after=still_gripping)

@@ -83,8 +83,9 @@ def test_the_fake_wrist_reports_at_once(make) -> None:
     assert skill.tool.latency_s == pytest.approx(0.0, abs=6e-3), "the fake's inertia comes a period at a time"
 
 
-@pytest.mark.parametrize("gives_m_N", [(2e-3, 3e-4), (2e-4, 3e-3), (5e-5, 5e-5)])
-@pytest.mark.parametrize("askew_rad", [0.0, 0.3, -0.7])
+@pytest.mark.parametrize(
+    ("gives_m_N", "askew_rad"), [((2e-3, 3e-4), 0.0), ((2e-4, 3e-3), 0.3), ((2e-3, 3e-4), -0.7), ((5e-5, 5e-5), 0.3)]
+)
 def test_the_compliance_is_measured_along_the_axes_of_the_hand(make, gives_m_N, askew_rad) -> None:
     """The wall x_P points at gives as its spring does, whatever the yaw at which the probe was grasped."""
     b, skill = make(things=[walls(stiffness_N_m=1.0 / np.array(gives_m_N))], askew_rad=askew_rad, turn_deg=45.0)

@@ -224,7 +224,7 @@ def test_broken_off_anywhere_it_keeps_hold_of_the_probe(make, preempt_all_along)
         b.robot.cycle = watch
         return b, skill
 
-    preempt_all_along(watched, 10)
+    preempt_all_along(watched, 6)
 
 
 def test_started_again_in_the_air_it_lets_go_of_nothing(make) -> None:

@@ -80,7 +80,7 @@ def test_tool_return__request_failed(make, monkeypatch) -> None:
 
 
 def test_broken_off_anywhere_it_lets_go_in_the_holder_only(make, preempt_all_along) -> None:
-    preempt_all_along(make, 10)
+    preempt_all_along(make, 6)
 
 
 @pytest.mark.parametrize("above_m", [0.12, 0.05, 0.01])

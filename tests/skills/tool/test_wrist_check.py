@@ -89,5 +89,5 @@ def test_high_already_nothing_moves(bench) -> None:
 
 
 def test_broken_off_anywhere(make, preempt_all_along) -> None:
-    preempt_all_along(lambda: ((b := make()), b.make(TareWrist)), 6)
-    preempt_all_along(lambda: ((b := make()), b.make(WristCheck)), 6)
+    preempt_all_along(lambda: ((b := make()), b.make(TareWrist)), 4)
+    preempt_all_along(lambda: ((b := make()), b.make(WristCheck)), 4)

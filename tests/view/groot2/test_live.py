@@ -14,10 +14,12 @@ from pathlib import Path
 
 import pytest
 import zmq
+from click.testing import Result
 from typer.testing import CliRunner
 
 from glotouch_bt import cli
 from tests.support.btcpp.installed import btcpp_python
+from tests.support.fake_cli import install_fakes
 from tests.support.groot2_client import Groot2Client, ServerError
 from tests.view.groot2.conftest import two_ports
 
@@ -55,15 +57,12 @@ def started(folder: Path, *words: str) -> Iterator[subprocess.Popen[str]]:
         process.communicate(timeout=PATIENCE_S)
 
 
-def done(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(FAKE_CLI), *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
+@pytest.fixture
+def done(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    """Run a command with the fakes, in this process."""
+    install_fakes(monkeypatch.setattr)
+    monkeypatch.chdir(folder)
+    return lambda *words: CliRunner().invoke(cli.app, words)
 
 
 def eventually(look: Callable[[], bool]) -> None:
@@ -96,9 +95,9 @@ def test_a_monitor_sees_the_run(folder: Path) -> None:
 
 
 @pytest.mark.study
-def test_the_record_has_the_same_bytes_with_and_without_monitors(folder: Path) -> None:
+def test_the_record_has_the_same_bytes_with_and_without_monitors(folder: Path, done: Callable[..., Result]) -> None:
     port = two_ports()
-    without = done(folder, "run", "middle.yaml", "--out", "a")
+    without = done("run", "middle.yaml", "--out", "a")
     words = ("run", "middle.yaml", "--out", "b", "--groot2", str(port))
     with started(folder, *words) as run, Groot2Client(port) as client, Groot2Client(port) as other:
         eventually(lambda: has(client, LIVE))
@@ -110,7 +109,7 @@ def test_the_record_has_the_same_bytes_with_and_without_monitors(folder: Path) -
                     each.ask("B", b"middle")
                 except zmq.Again:
                     break  # the run has ended
-        assert (without.returncode, run.wait(PATIENCE_S)) == (0, 0)
+        assert (without.exit_code, run.wait(PATIENCE_S)) == (0, 0)
     a, b = folder / "a", folder / "b"
     assert (a / "run.mcap").read_bytes() == (b / "run.mcap").read_bytes()
     assert sorted(p.name for p in a.iterdir()) == sorted(p.name for p in b.iterdir())
@@ -129,10 +128,10 @@ def test_a_monitor_sees_a_resumed_run(folder: Path) -> None:
     assert json.loads((folder / "a" / "result.json").read_text())["status"] == "success"
 
 
-def test_a_finished_run_is_shown_too(folder: Path) -> None:
+def test_a_finished_run_is_shown_too(folder: Path, done: Callable[..., Result]) -> None:
     pytest.importorskip("viser")
     port = two_ports()
-    assert done(folder, "run", "short.yaml", "--out", "a").returncode == 0
+    assert done("run", "short.yaml", "--out", "a").exit_code == 0
     before = {p.name: (p.read_bytes(), p.stat().st_mtime_ns) for p in (folder / "a").iterdir()}
     with started(folder, "view", "a", "--no-browser", "--groot2", str(port)) as view, Groot2Client(port) as client:
         eventually(lambda: has(client, {**ENDED, "last": "FAILURE"}))
@@ -145,6 +144,7 @@ def test_a_finished_run_is_shown_too(folder: Path) -> None:
     assert {p.name: (p.read_bytes(), p.stat().st_mtime_ns) for p in (folder / "a").iterdir()} == before
 
 
+@pytest.mark.study
 def test_a_free_monitor_shows_the_run(folder: Path) -> None:
     port, python = two_ports(), btcpp_python()
     more = "".join(f"  - wait: {{name: longer {i}, seconds: 800.0}}\n" for i in range(9))
@@ -172,12 +172,12 @@ def test_a_port_that_cannot_be_is_refused(command: str, given: str, folder: Path
     assert sorted(p.name for p in folder.iterdir()) == ["middle.yaml", "nap.yaml", "short.yaml"]
 
 
-def test_a_port_in_use_ends_the_command_before_anything_moves(folder: Path) -> None:
+def test_a_port_in_use_ends_the_command_before_anything_moves(folder: Path, done: Callable[..., Result]) -> None:
     port = two_ports()
     with zmq.Context() as context, context.socket(zmq.REP) as other:
         other.bind(f"tcp://127.0.0.1:{port}")
-        result = done(folder, "run", "--out", "a", "short.yaml", "--groot2", str(port))
-    assert (result.returncode, result.stdout) == (2, "")
+        result = done("run", "--out", "a", "short.yaml", "--groot2", str(port))
+    assert (result.exit_code, result.stdout) == (2, "")
     sentence = f"port {port} is in use or not allowed; give another one: --groot2 PORT"
     assert result.stderr == f"glotouch: --groot2 {port}: {sentence}\n"
     assert not (folder / "a").exists()

@@ -79,8 +79,10 @@ def test_box_reaches_the_optimum_of_a_global_search(bench):
     assert loss([*got.centre_K_m, got.yaw_rad, *got.size_m]) < best.fun + 0.3
 
 
-@pytest.mark.parametrize(("noise", "centre_mm"), [(3e-4, 0.7), (1e-3, 3.0)])
-@pytest.mark.parametrize("size", [(0.04, 0.04), (0.06, 0.045), (0.107, 0.042)])
+@pytest.mark.parametrize(
+    ("size", "noise", "centre_mm"),
+    [((0.04, 0.04), 3e-4, 0.7), ((0.04, 0.04), 1e-3, 3.0), ((0.06, 0.045), 1e-3, 3.0), ((0.107, 0.042), 3e-4, 0.7)],
+)
 def test_traced_rectangles_at_random_poses(bench, size, noise, centre_mm):
     """Centre error and sides of what an orbit-and-probe trace gives; 17 of 20 classes right.
 
