@@ -21,6 +21,9 @@ from glotouch_skills.common.hand import (
 )
 from glotouch_skills.common.planning import GraspPlan
 
+OPENED_M = 0.02
+"""The jaws are opened at least this much wider than the object. Source: ours."""
+
 
 class PutBackParams(SkillParams):
     """Parameters of `put_back`."""
@@ -37,7 +40,8 @@ class PutBackParams(SkillParams):
 
 
 class PutBack(Skill):
-    """Rise, lower the object to where it was taken, open gently, rise again. Empty jaws only open.
+    """Rise, lower the object to where it was taken, open gently, rise again. Closed or open jaws hold nothing and only
+    open.
 
     The object is released just above where it was taken, or where it touches something on the way down.
 
@@ -70,11 +74,12 @@ class PutBack(Skill):
         yield from rise_clear(arm, p.speed_m_s)
         yield from let_jaws_rest(arm)
         apart = arm.aperture_m
-        opening = min(max(apart, 0.0) + 0.02, arm.description.gripper.stroke_m)
-        if apart < p.min_aperture_m or made is None:
+        stroke_m = arm.description.gripper.stroke_m
+        opening = min(max(apart, 0.0) + OPENED_M, stroke_m)
+        if made is None or not self._holds(made, apart):
             yield from arm.jaws(opening)
             return
-        opening = min(max(made.opening_m, opening), arm.description.gripper.stroke_m)
+        opening = min(max(made.opening_m, opening), stroke_m)
         container = self.context.world.container
         place = hand_pose_B(arm, container, made.position_K_m + np.array([0.0, 0.0, RELEASE_HEIGHT_M]), made.yaw_rad)
         high = float(arm.pose_B_P.position_m[2])
@@ -92,3 +97,12 @@ class PutBack(Skill):
         yield from release(arm, opening)
         yield from rise_clear(arm, p.speed_m_s)
         self.event("put_back", candidate=made.candidate, above_m=above)
+
+    def _holds(self, made: GraspPlan, apart_m: float) -> bool:
+        """Return True if the jaws may hold what the grasp took: they are neither closed nor open.
+
+        Jaws on an object do not move apart. They are open if they are halfway to where they let go of it.
+        """
+        taken_m = made.aperture_m if made.closed_m is None else made.closed_m
+        open_m = min(max(made.opening_m, taken_m + OPENED_M), self.context.arm.description.gripper.stroke_m)
+        return self.params.min_aperture_m <= apart_m < 0.5 * (taken_m + open_m)
