@@ -11,6 +11,7 @@ from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Pose
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import (
+    MIN_GRIP_N,
     RELEASE_HEIGHT_M,
     keeping_clear_of,
     let_jaws_rest,
@@ -23,6 +24,8 @@ from glotouch_skills.common.planning import GraspPlan
 
 OPENED_M = 0.02
 """The jaws are opened at least this much wider than the object. Source: ours."""
+ALIKE_M = 0.004
+"""Maximum change of the aperture of jaws that still hold the object as it was taken. Source: as `slip_m` of `lift`."""
 
 
 class PutBackParams(SkillParams):
@@ -40,8 +43,7 @@ class PutBackParams(SkillParams):
 
 
 class PutBack(Skill):
-    """Rise, lower the object to where it was taken, open gently, rise again. Closed or open jaws hold nothing and only
-    open.
+    """Rise, lower the object to where it was taken, open gently, rise again. Jaws that hold nothing only open.
 
     The object is released just above where it was taken, or where it touches something on the way down.
 
@@ -76,7 +78,7 @@ class PutBack(Skill):
         apart = arm.aperture_m
         stroke_m = arm.description.gripper.stroke_m
         opening = min(max(apart, 0.0) + OPENED_M, stroke_m)
-        if made is None or not self._holds(made, apart):
+        if made is None or not self._holds(made):
             yield from arm.jaws(opening)
             return
         opening = min(max(made.opening_m, opening), stroke_m)
@@ -98,11 +100,12 @@ class PutBack(Skill):
         yield from rise_clear(arm, p.speed_m_s)
         self.event("put_back", candidate=made.candidate, above_m=above)
 
-    def _holds(self, made: GraspPlan, apart_m: float) -> bool:
-        """Return True if the jaws may hold what the grasp took: they are neither closed nor open.
+    def _holds(self, made: GraspPlan) -> bool:
+        """Return True if the jaws may hold what the grasp took: they press, or are as far apart as on the object.
 
-        Jaws on an object do not move apart. They are open if they are halfway to where they let go of it.
+        Both witnesses must say that they hold nothing before they are opened up here.
         """
+        jaws = self.context.observation.gripper
         taken_m = made.aperture_m if made.closed_m is None else made.closed_m
-        open_m = min(max(made.opening_m, taken_m + OPENED_M), self.context.arm.description.gripper.stroke_m)
-        return self.params.min_aperture_m <= apart_m < 0.5 * (taken_m + open_m)
+        alike = abs(jaws.aperture_m - taken_m) <= ALIKE_M
+        return jaws.aperture_m >= self.params.min_aperture_m and (alike or jaws.force_N >= MIN_GRIP_N)

@@ -17,4 +17,13 @@ from glotouch_skills.common.hand.line_guard import (
 from glotouch_skills.common.hand.lowering import RELEASE_HEIGHT_M, let_jaws_rest, lower
 from glotouch_skills.common.hand.retract import CAUGHT_N, RISE_M_S, rise_clear
 from glotouch_skills.common.hand.wait_for import REQUEST_FAILED, WRIST_STATES, finish, set_payload_and_tare
-from glotouch_skills.common.hand.weighing import GRAVITY_M_S2, MIN_GRIP_M, STAND_S, Hold, feel_hold, weigh, weigh_N
+from glotouch_skills.common.hand.weighing import (
+    GRAVITY_M_S2,
+    MIN_GRIP_M,
+    MIN_GRIP_N,
+    STAND_S,
+    Hold,
+    feel_hold,
+    weigh,
+    weigh_N,
+)

@@ -75,10 +75,11 @@ def test_nothing_to_put_back(make, made, jaws_m) -> None:
     assert b.arm.aperture_m > 0.015
 
 
-def test_jaws_that_let_go_before_hold_nothing(make, things) -> None:
+@pytest.mark.parametrize("apart_m", [0.03, 0.056, 0.065])
+def test_jaws_that_let_go_before_hold_nothing(make, things, apart_m: float) -> None:
     """The grasp is still on the blackboard. Going down to its place would meet what stands there now."""
     b, skill = make(dataclasses.replace(TAKEN, closed_m=0.05), None, things=[things.floor(0.05)])
-    b.go(b.arm.jaws(0.065, speed_m_s=0.2))
+    b.go(b.arm.jaws(apart_m, speed_m_s=0.2))
     z = float(b.arm.pose_B_P.position_m[2])
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
