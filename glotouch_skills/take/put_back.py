@@ -103,7 +103,7 @@ class PutBack(Skill):
     def _holds(self, made: GraspPlan) -> bool:
         """Return True if the jaws may hold what the grasp took: they press, or are as far apart as on the object.
 
-        Both witnesses must say that they hold nothing before they are opened up here.
+        They are opened up here only if force and aperture both show that they hold nothing.
         """
         jaws = self.context.observation.gripper
         taken_m = made.aperture_m if made.closed_m is None else made.closed_m
