@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export MPLBACKEND := Agg
 
-.PHONY: demo dev test test-integration test-all test-studies test-browser check format docs reference results-page pins clean
+.PHONY: demo dev test test-integration test-studies test-browser check format docs reference results-page pins clean
 
 demo: $(VENV)
 	$(BIN)/glotouch run retrieve --set target=apple --seed 0
@@ -17,10 +17,6 @@ test: $(VENV)/.compiled
 # Whole missions, backends and conformance in MuJoCo and on simulated devices, for which some tests wait.
 test-integration: $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not study" tests/integration
-
-# Both of them in one session: one start, and no core idle while the last test of either ends.
-test-all: $(VENV)/.compiled
-	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not study" --ignore=tests/browser
 
 # Slow tests, among them whole benches on a small scale: minutes that show little more than the tests of their parts. Not in .ci/run.
 test-studies: $(VENV)/.compiled

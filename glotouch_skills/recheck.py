@@ -12,11 +12,9 @@ from glotouch_bt.perception.touch.detection import Polygon
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Skill, SkillParams, SkillRun, come_to_rest, param
 from glotouch_bt.skill.probing import HeldTool, Prober
-from glotouch_skills.common.hand import REQUEST_FAILED, rise_clear, set_payload_and_tare
+from glotouch_skills.common.hand import MIN_GRIP_N, REQUEST_FAILED, rise_clear, set_payload_and_tare
 from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, HELD_TOLERANCE_M, feel_floor
 
-MIN_GRIP_N = 1.0
-"""Jaw force above which the jaws hold something."""
 DIRECTIONS = 24
 """Number of approach directions to consider."""
 BEFORE_M = 0.012

@@ -20,8 +20,8 @@ CHANGE_S = 42.0
 of 60 nominal missions."""
 
 MAX_ABSENT = 0.1
-"""Maximum probability of an absent target at which a candidate is taken for the target. Source: ours; on touches of 25
-generated solids that are not used otherwise, 1 of 90 absent targets was taken with 0.1 and with 0.03, 2 with 0.15."""
+"""Maximum probability of an absent target at which a candidate is taken for the target. Source: ours; half of what
+`match` allows."""
 POSE_LAYERS = 2.0
 """Minimum number of two-sided layers for a pose at which a grasp can be planned. Source: ours."""
 
@@ -117,8 +117,8 @@ def is_sure(belief: Belief, confidence: float) -> bool:
     """Return True if the likeliest candidate is the target with sufficient probability.
 
     Two questions have a threshold each: which candidate it is if it is one of them (`confidence`), and whether it is
-    one of them (`MAX_ABSENT`). Closures that turn an object fit no target well. They raise the probability of an absent
-    target and leave the first question alone.
+    one of them (`MAX_ABSENT`). The widths felt on an object that turned fit no target well: they raise the probability
+    of an absent target, but still tell the candidates apart.
     """
     present = 1.0 - belief.ranking.p_absent
     return present >= 1.0 - MAX_ABSENT and best_of(belief).probability >= confidence * present

@@ -86,6 +86,15 @@ def test_jaws_that_let_go_before_hold_nothing(make, things, apart_m: float) -> N
     assert float(b.arm.pose_B_P.position_m[2]) == pytest.approx(z)
 
 
+def test_what_turned_between_the_jaws_is_put_back_too(make) -> None:
+    """The jaws closed farther than when it was taken, and press."""
+    b, skill = make(dataclasses.replace(TAKEN, closed_m=0.05), 0.04)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    np.testing.assert_allclose(b.opened, np.tile(OVER_B_M + SHORT_B_M, (len(b.opened), 1)), atol=1e-4)
+    assert b.opened
+
+
 def test_broken_off_anywhere(make, preempt_all_along) -> None:
     preempt_all_along(make, 5)
 
