@@ -27,7 +27,14 @@ from glotouch_bt.perception.touch import (
     signed_distance,
     split_at_motion,
 )
-from glotouch_bt.perception.touch.outline import OutlineBelief, area_and_centroid, convex_hull, envelope, minimum_rectangle, polygon_distance
+from glotouch_bt.perception.touch.outline import (
+    OutlineBelief,
+    area_and_centroid,
+    convex_hull,
+    envelope,
+    minimum_rectangle,
+    polygon_distance,
+)
 from glotouch_bt.robot import Array, ParamError
 
 MIN_CONTACTS = 3

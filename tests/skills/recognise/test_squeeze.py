@@ -9,6 +9,7 @@ import pytest
 from py_trees.common import Status
 
 import glotouch_skills.common.planning.squeeze_motion as motion
+from glotouch_bt.perception.touch import ObjectMotion
 from glotouch_skills.recognise.squeeze import Squeeze
 
 WIDTH = 0.05
@@ -144,3 +145,15 @@ def test_what_stands_still_is_not_reported_as_moved(make) -> None:
     b.run(skill)
     assert not b.of_kind("object_moved")
     assert all(abs(layer.slide_m) + abs(layer.turn_rad) + layer.compliance_m < 1e-6 for layer in skill.touchset.layers)
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_free_space_beside_an_object_is_forgotten_only_when_a_closure_moves_it(make, monkeypatch, moves: bool) -> None:
+    felt_K_m = np.array([[0.06, 0.02, 0.018]])
+    moved = ObjectMotion(0.005 if moves else 0.0, 0.0, 0.0, True)
+    monkeypatch.setattr(motion, "estimate_object_motion", lambda *_, **__: moved)
+    b, skill = make()
+    b.arm.felt.add(felt_K_m)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert np.isfinite(b.arm.felt.free_down_to(felt_K_m[:, :2], 0.001)) is np.bool_(not moves)
