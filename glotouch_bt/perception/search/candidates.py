@@ -11,9 +11,10 @@ import numpy as np
 from glotouch_bt.perception.search.bodies import (
     KNOWN_QUALITY,
     SEPARATE_NATS,
+    Doubt,
     bodies,
-    count_doubtful,
-    doubtful_pairs,
+    chance_of_fewer,
+    doubts,
     outline_of,
     same_body,
 )
@@ -75,14 +76,14 @@ class Admitted:
         candidates: All candidates.
         index: Index of the new or updated candidate; None if the trace gave none.
         changed: Indices of all new or updated candidates, `index` first: one contour may be several bodies.
-        doubtful: Pairs of neighbours that may be one body.
+        doubts: Neighbours that may be one body.
     """
 
     belief: SearchMap
     candidates: tuple[Candidate, ...]
     index: int | None
     changed: tuple[int, ...] = ()
-    doubtful: tuple[tuple[Candidate, Candidate], ...] = ()
+    doubts: tuple[Doubt, ...] = ()
 
 
 def admit(
@@ -194,10 +195,10 @@ def _next_index(candidates: Iterable[Candidate]) -> int:
 def _admitted(
     belief: SearchMap, every: dict[int, Candidate], radius_m: float, index: int, changed: tuple[int, ...]
 ) -> Admitted:
-    """Return the result, with the pairs of candidates that are doubtful now."""
+    """Return the result, with the doubts about neighbours."""
     candidates = tuple(every[i] for i in sorted(every))
-    pairs = doubtful_pairs(candidates, radius_m, belief.path_K_m)
-    return Admitted(belief.with_doubtful(count_doubtful(pairs)), candidates, index, changed, pairs)
+    found = doubts(candidates, radius_m, belief.path_K_m)
+    return Admitted(belief.with_doubt(chance_of_fewer(found)), candidates, index, changed, found)
 
 
 def refined(before: Candidate, traced: OutlineTrace) -> Candidate | None:

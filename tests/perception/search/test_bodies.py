@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit
-from glotouch_bt.perception.search.bodies import bodies, count_doubtful, distinct, doubtful_pairs, outline_of
+from glotouch_bt.perception.search.bodies import Doubt, bodies, chance_of_fewer, distinct, doubts, outline_of
 from glotouch_bt.perception.search.candidates import quality, regroup
 from glotouch_bt.perception.touch import Candidate, Contact
 
@@ -84,16 +84,15 @@ def test_a_contour_of_two_bodies_becomes_two_candidates_that_count() -> None:
 def test_parts_of_one_body_are_doubtful_and_bodies_far_apart_are_not() -> None:
     halves = candidate(0, LEFT[:3]), candidate(1, LEFT[3:])
     far = candidate(2, disc(0.1, 0.1, 0.03, (0, 60, 120, 180, 240, 300)))
-    pairs = doubtful_pairs((*halves, far), R, NO_PATH)
-    assert [(a.index, b.index) for a, b in pairs] == [(0, 1)]
-    assert count_doubtful(pairs) == 1
+    (doubt,) = doubts((*halves, far), R, NO_PATH)
+    assert [c.index for c in doubt.pair] == [0, 1]
+    assert doubt.chance > 0.3
 
 
-def test_candidates_are_counted_once_in_a_chain_of_doubtful_pairs() -> None:
-    a, b, c, d = (candidate(i, LEFT) for i in range(4))
-    assert count_doubtful(()) == 0
-    assert count_doubtful(((a, b), (b, c), (a, c))) == 2
-    assert count_doubtful(((a, b), (c, d))) == 2
+def test_the_chance_of_fewer_bodies_takes_pairs_as_independent() -> None:
+    pair = candidate(0, LEFT), candidate(1, RIGHT)
+    assert chance_of_fewer(()) == 0.0
+    assert chance_of_fewer((Doubt(pair, 0.5), Doubt(pair, 0.2))) == pytest.approx(0.6)
 
 
 def test_parts_that_turn_out_to_be_one_body_are_one_candidate() -> None:

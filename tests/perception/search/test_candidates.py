@@ -113,7 +113,7 @@ def test_a_part_that_stands_out_costs_no_contact_and_is_checked():
     belief = SearchMap.blank((0.2, 0.15), expected=3).with_exclusion(known.contour, 0.01)
     admitted = admit(belief, (known,), nose[0], traced, 0.018, 0.01)
     assert sum(len(c.contacts) for c in admitted.candidates) == len(known.contacts) + len(nose)
-    assert len(admitted.candidates) == 1 + len(admitted.doubtful)
+    assert len(admitted.candidates) == 1 + len(admitted.doubts)
 
 
 def test_a_trace_round_a_neighbour_keeps_the_contacts_of_the_candidate_that_it_merges_with():
