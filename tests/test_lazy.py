@@ -14,6 +14,7 @@ HEAVY = (
     "trimesh",
     "scipy.ndimage",
     "scipy.spatial",
+    "scipy.special",
     "mcap",
     "mujoco",
     "matplotlib",

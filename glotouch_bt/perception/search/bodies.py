@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit
+import scipy
 
 from glotouch_bt.perception.search.map import Mask
 from glotouch_bt.perception.search.tracing import TraceParams
@@ -156,7 +156,7 @@ def _doubt(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> Doub
         return None
     odds = ONE_BODY["apart"] + ONE_BODY["nat"] * min(gain, CEILING_NATS)
     odds += ONE_BODY["overlap"] * (max(depths) < 0.0) + ONE_BODY["uncertain"] * uncertain
-    return Doubt((a, b), float(expit(odds)))
+    return Doubt((a, b), float(scipy.special.expit(odds)))
 
 
 def gain_of_two(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> float:
