@@ -39,6 +39,13 @@ DOWN_M_S = 0.03
 MAX_PULL_M_S = 0.05
 """Largest speed of the extraction. At this speed, a probe stuck with 3 N/mm is pulled by 2.5 N more until the arm
 stops, which stays below the hard limit."""
+SLOT_M_S = 0.02
+"""Speed at which the ball enters the holder from below. A ball beside the middle of the slot snags on its edge and
+slips in; if it is faster, the robot's own stop takes that for a collision (`bench search --conditions harsh`, seed
+53657, e539f6ee)."""
+SLOT_M = 0.018
+"""The ball may snag from this far below the holder's lower edge on. Source: ours; its radius, and the height of the
+rails, which the holder's description leaves out."""
 HANDLE_TOLERANCE_M = 0.004
 """The jaws hold the handle if the aperture is within this of its width: twice the largest bias, and compliance."""
 MIN_OPEN_M = 0.01
@@ -234,7 +241,16 @@ class ToolPickup(Skill):
         if up <= 1e-4:
             return
         guard = yield from straight_guard(arm, UP_B, MAX_PULL_FORCE_N)
-        paces = ((0.0, min(self.params.speed_m_s, MAX_PULL_M_S)), (max(out + OUT_M, 0.0), self.params.speed_m_s))
-        moved = yield from arm.shift(up * UP_B, self.params.speed_m_s, check=False, paces=paces, guard=guard)
+        speed_m_s = self.params.speed_m_s
+        pull_m_s = min(speed_m_s, MAX_PULL_M_S)
+        slot = out - 2.0 * self.context.world.holder.half_m[2]
+        changes = (
+            (0.0, pull_m_s),
+            (slot - SLOT_M, min(pull_m_s, SLOT_M_S)),
+            (slot, pull_m_s),
+            (out + OUT_M, speed_m_s),
+        )
+        paces = tuple((max(at, 0.0), pace) for at, pace in changes)
+        moved = yield from arm.shift(up * UP_B, speed_m_s, check=False, paces=paces, guard=guard)
         if (why := describe_stop(moved)) is not None:
             raise self.HARD_CONTACT(f"the probe does not come out of its holder: {why}", travelled_m=moved.travelled_m)

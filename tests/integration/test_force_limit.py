@@ -84,3 +84,11 @@ def test_an_object_that_is_dropped_in_the_lift_is_not_reported_as_lifted(faulted
     given = {"opening_m": 0.08, "duration_s": 10}
     result = faulted("pick_at", "grip_drop", given, {"node": "lift", "after_s": 0.5})
     assert (result["status"], result["reason_chain"][-1]["code"]) == ("failure", "lost")
+
+
+def test_a_ball_beside_the_middle_of_its_slot_is_drawn_out(tmp_path: Path) -> None:
+    """It snags on the edge of the slot; drawn at 50 mm/s, the robot stops."""
+    request = RunRequest("calibrate", seed=53657, conditions="harsh", out=tmp_path / "run", report=False)
+    result = launch(request).result
+    assert result["status"] == "success"
+    assert 10.0 < result["true_peak_force_N"] < Limits().hard_force_N
