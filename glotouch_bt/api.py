@@ -134,8 +134,9 @@ def open_robot(
         BackendError: The backend did not open.
     """
     scene = world if isinstance(world, World) else load_world(str(world))
+    found = load_backend(backend)
     load_all()  # a driver stops the arm when the client is silent for as long as an import takes
-    return load_backend(backend).open(scene, load_conditions(str(conditions)), seed, options)
+    return found.open(scene, load_conditions(str(conditions)), seed, options)
 
 
 def _as_text(value: object) -> str:

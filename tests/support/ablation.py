@@ -1,10 +1,11 @@
-"""What each measure against waiting is worth: the same missions with one measure switched off at a time. One command:
+"""Robot time that each way of saving it saves: the same missions with one of them switched off at a time. One command:
 
 python tests/support/ablation.py --trials 30 --seed 59800 --out runs/ablation
 
-Each measure is a constant, a parameter's default or a function of the package, which gets another value in the worker
+Each one is a constant, a parameter's default or a function of the package, which gets another value in the worker
 processes. Missions, worlds and seeds are those of `glotouch bench retrieve --per-seed 1`. Differences are paired by
-world. The command continues where it was broken off.
+world; those of the robot time are of worlds in which both missions succeed. The command continues where it was broken
+off.
 """
 
 from __future__ import annotations
@@ -55,10 +56,20 @@ def default(name: str, before: float, after: float) -> Callable[[], None]:
     return change
 
 
-def value(module: str, name: str, after: object) -> Callable[[], None]:
-    """Change a constant or a function in its module and in every module that has imported it."""
+def value(place: str, name: str, after: object) -> Callable[[], None]:
+    """Change a constant or a function of a module, there and in every module that has imported it, or of a class.
+
+    Args:
+        place: The module, or MODULE:CLASS.
+        name: Name of the constant, function or method.
+        after: What replaces it.
+    """
 
     def change() -> None:
+        module, _, cls = place.partition(":")
+        if cls:
+            setattr(getattr(importlib.import_module(module), cls), name, after)
+            return
         before = getattr(importlib.import_module(module), name)
         for key, found in list(sys.modules.items()):
             if key.partition(".")[0] in PACKAGES and vars(found).get(name) is before:
@@ -74,13 +85,17 @@ def always(answer: bool) -> Callable[..., bool]:
 
 SCHEDULE = "glotouch_bt.perception.recognition.schedule"
 CLOSURES = "glotouch_skills.common.planning.squeeze_motion"
+FELT = "glotouch_bt.motion.tool_memory:FeltSpace"
 MEASURES: dict[str, tuple[Callable[[], None], ...]] = {
     "none": (),
     "excluded candidates are left alone": (value(SCHEDULE, "EXCLUDED_SHARE", 0.0),),
     "measuring is put off": (value(SCHEDULE, "pays_now", always(True)),),
     "closing ends when the target is known": (value(SCHEDULE, "is_sure", always(False)),),
     "closures that tell little are left out": (default("min_gain_nats", 0.02, 0.0),),
-    "fast where space was felt to be free": (value("glotouch_bt.motion.tool_memory", "CLEAR_OF_TOUCH_M", 10.0),),
+    "fast where space was felt to be free": (
+        value(FELT, "columns", lambda *_: np.zeros((0, 2))),
+        value(FELT, "free_down_to", lambda *_: np.inf),
+    ),
     "fast above the contents": tuple(
         default(name, *TRAVEL_M_S) for name in ("travel_speed_m_s", "speed_m_s", "free_speed_m_s")
     ),
@@ -89,7 +104,7 @@ MEASURES: dict[str, tuple[Callable[[], None], ...]] = {
     "jaws open as far as needed": (default("side_gap_m", 0.01, 0.03),),
     "short plateau": (default("settle_s", 0.15, 0.5),),
 }
-"""Measures, and what switches each one off."""
+"""Ways of saving robot time, and what switches each one off."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +151,10 @@ def run_without(measure: str, head: Row, request: RunRequest) -> Row:
 
 
 def touches(result: dict[str, Any]) -> dict[str, Any]:
-    """Return the contacts of the probe and the two-sided closures on the likeliest candidate and on each other one."""
+    """Return the contacts of the probe and the closures on the likeliest candidate, and their means on the others.
+
+    A closure that felt one side only counts as part of one (`Match.evidence`).
+    """
     matches = (result.get("ranking") or {}).get("matches") or []
     closures = {m["index"]: m["evidence"] for m in matches}
     contacts = {c["index"]: c["contacts"] for c in result.get("candidates") or []}
@@ -163,17 +181,19 @@ def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
     for measure, some in rows.items():
         pairs = list(zip(rows["none"], some, strict=True))
         worlds = [str(row["seed"]) for row in some]
-        both = [i for i, pair in enumerate(pairs) if all(row.get("sim_time_s") is not None for row in pair)]
-        times = np.array([[row["sim_time_s"] for row in pairs[i]] for i in both])
-        put("sim_s", measure, float(np.median([row["sim_time_s"] for row in some if row.get("sim_time_s")])))
-        put("more_s", measure, paired_mean(times[:, 0], times[:, 1], [worlds[i] for i in both]))
+        both = [i for i, pair in enumerate(pairs) if all(map(succeeded, pair))]
+        if both:
+            times = np.array([[row["sim_time_s"] for row in pairs[i]] for i in both])
+            put("sim_s", measure, float(np.median(times[:, 1])))
+            put("more_s", measure, paired_mean(times[:, 0], times[:, 1], [worlds[i] for i in both]))
         put("success", measure, wilson(sum(map(succeeded, some)), len(some)))
         before, after = ([succeeded(row) for row in side] for side in zip(*pairs, strict=True))
         put("difference", measure, paired_rate(before, after, worlds))
         put("wrong", measure, sum(bool(row.get("retrieved")) and not row.get("correct") for row in some))
         put("peak_N", measure, max(float(row.get("peak_force_N") or 0.0) for row in some))
         for name in ("closures_target", "closures_other", "contacts_target", "contacts_other"):
-            put(name, measure, float(np.mean([row[name] for row in some if row.get(name) is not None])))
+            if counts := [row[name] for row in some if row.get(name) is not None]:
+                put(name, measure, float(np.mean(counts)))
     return found
 
 

@@ -23,7 +23,7 @@ class Found:
     """A candidate to score.
 
     Attributes:
-        travel_m: Planar travel when it was last traced.
+        travel_m: Planar travel when it was last traced; `known_from_m` is the travel that counts as its discovery.
         centre_K_m: (2,) centre of its contour.
         kind: Kind of its contour.
         yaw_rad: Direction of its long side.

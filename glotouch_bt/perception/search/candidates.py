@@ -198,7 +198,8 @@ def _admitted(
     """Return the result, with the doubts about neighbours."""
     candidates = tuple(every[i] for i in sorted(every))
     found = doubts(candidates, radius_m, belief.path_K_m)
-    return Admitted(belief.with_doubt(chance_of_fewer(found)), candidates, index, changed, found)
+    surplus = 0 if belief.expected is None else max(belief.found - belief.expected, 0)
+    return Admitted(belief.with_doubt(chance_of_fewer(found, surplus)), candidates, index, changed, found)
 
 
 def refined(before: Candidate, traced: OutlineTrace) -> Candidate | None:

@@ -25,7 +25,7 @@ FACING = -0.4
 """Minimum cosine between the force on the ball and the direction from an object's centre to the contact for the contact
 to belong to the object."""
 MISSED_BELOW = 0.02
-"""Chance that a known number of objects is not complete below which the search ends."""
+"""Chance that one of a known number of objects is missing, below which the search ends. Source: ours."""
 WALL_M = 0.003
 """Maximum distance from a wall of a contact with it. Source: ours; no object is as thin."""
 WALL_COSINE = 0.9
@@ -74,7 +74,7 @@ class SearchMap:
         hints: Contacts with other objects during a trace; the search visits them first.
         left_below: With an unknown number, the chance that something is left below which the search is complete.
         interior_m: Length and width of the container's interior; None: its walls are unknown.
-        doubt: Probability that there are fewer bodies than traced objects.
+        doubt: Probability that there are fewer bodies than the known number, although as many objects are traced.
     """
 
     half_extent_m: Array
@@ -131,7 +131,8 @@ class SearchMap:
         """Add a traced object, or replace the exclusion of a known one: where it no longer is may be searched again.
 
         Args:
-            contour: Its envelope. Contacts outside the outline widen the margin, by 10 mm at most.
+            contour: Where certainly nothing else stands, such as its envelope. Contacts outside the outline widen the
+                margin, by 10 mm at most.
             margin_m: Distance that the tip's centre keeps from the envelope.
             index: Index of the object; None: a new one.
         """
@@ -264,7 +265,7 @@ class SearchMap:
     def complete(self) -> bool:
         """True if all expected objects are traced; for an unknown number, if hardly anything can be left.
 
-        A hint that is not followed yet may be an object that is left.
+        Of a doubtful number (`MISSED_BELOW`), a hint that is not followed yet may be the object that is missing.
         """
         if self.expected is None:
             return not self.hints and self.chance_left < self.left_below

@@ -178,12 +178,11 @@ def _travel_s(
     gripper: Gripper,
     p: ClosureParams,
 ) -> float:
-    """Return the time of moving up, across and down to `height_m` beside the candidate."""
+    """Return the time of moving to the headroom, across, and down to `height_m` beside the candidate."""
     below = gripper.fingertip_below_P_m
-    tips = max(p.headroom_m, float(hand_K_m[2]) - below)
     across = float(np.linalg.norm(at.position_K_m - hand_K_m[:2]))
-    up = tips + below - float(hand_K_m[2])
+    up = abs(p.headroom_m + below - float(hand_K_m[2]))
     edges = inner_edges(gripper, Pose.pointing_down(np.array([*at.position_K_m, height_m]), at.yaw_K_rad), at.opening_m)
-    paces = descent_paces(felt, edges, tips, candidate.height_m, p.descent_speed_m_s)
-    down_s = seconds_at(paces, tips + below - height_m)
+    paces = descent_paces(felt, edges, p.headroom_m, candidate.height_m, p.descent_speed_m_s)
+    down_s = seconds_at(paces, p.headroom_m + below - height_m)
     return (up + across) / p.travel_speed_m_s + down_s + TURN_S + 4 * STOP_S

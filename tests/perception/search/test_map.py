@@ -151,3 +151,4 @@ def test_a_doubtful_object_counts_once_hardly_anything_can_have_been_missed():
     assert swept.complete
     hint = Contact(0.0, np.zeros(3), np.array([1.0, 0, 0]), np.array([-1.0, 0, 0]), np.array([0.1, 0.0]), 1.0)
     assert not swept.with_hints((hint,)).complete, "what was met may be the one that is missing"
+    assert found.with_hints((hint,)).complete, "a number beyond doubt needs no hint"
