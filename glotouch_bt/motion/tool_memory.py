@@ -179,6 +179,11 @@ class ToolSeat:
         length = float(np.linalg.norm(moved))
         return np.array([*(moved * min(1.0, MAX_DISPLACEMENT_M / max(length, 1e-12))), 0.0])
 
+    @property
+    def tip_B_m(self) -> Array:
+        """(3,) horizontal offset of the held tool's tip from P by the last measurement; zero if it is not known."""
+        return np.zeros(3) if self._now_B_m is None else np.array([*self._now_B_m, 0.0])
+
     def state(self) -> dict[str, Any]:
         """Return the record, for `restore`."""
         return {"first_B_m": self._first_B_m, "now_B_m": self._now_B_m}
