@@ -2,6 +2,7 @@
 #   docker build -t glotouch .
 #   docker run --rm -v "$PWD/runs:/app/runs" glotouch                      # the demo; its report is in runs/
 #   docker run --rm -v "$PWD/runs:/app/runs" glotouch run survey --seed 1
+# The page of --live listens on 127.0.0.1 inside the container only; open runs/.../report.html instead.
 FROM python:3.11-slim
 ENV MPLBACKEND=Agg PIP_DISABLE_PIP_VERSION_CHECK=1 PYTHONDONTWRITEBYTECODE=1
 RUN apt-get update \

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from glotouch_bt.faults import FaultPlan
+from glotouch_bt.lazy import load_all
 from glotouch_bt.mission import check_feasible, load_mission, split_settings
 from glotouch_bt.mission.read import Value, load_conditions, load_world
 from glotouch_bt.mission.spec import Finding, MissionFaults
@@ -133,7 +134,9 @@ def open_robot(
         BackendError: The backend did not open.
     """
     scene = world if isinstance(world, World) else load_world(str(world))
-    return load_backend(backend).open(scene, load_conditions(str(conditions)), seed, options)
+    found = load_backend(backend)
+    load_all()  # a driver stops the arm when the client is silent for as long as an import takes
+    return found.open(scene, load_conditions(str(conditions)), seed, options)
 
 
 def _as_text(value: object) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 # flake
 HEAVY = (
     "pinocchio",
@@ -12,6 +14,7 @@ HEAVY = (
     "trimesh",
     "scipy.ndimage",
     "scipy.spatial",
+    "scipy.special",
     "mcap",
     "mujoco",
     "matplotlib",
@@ -48,3 +51,23 @@ def test_load_all_does_not_keep_what_an_earlier_run_left() -> None:
         "load_all(); assert left() is None\n"
     )
     loaded_after(code)
+
+
+OPENINGS = {
+    "open_robot": "import glotouch_bt.api as module; start = lambda: module.open_robot('fake')",
+    "bench link": "from pathlib import Path; import glotouch_bt.commissioning.link as module; "
+    "start = lambda: module.run_study(module.LinkStudy('fake', Path('unused')))",
+}
+
+
+@pytest.mark.parametrize("opening", OPENINGS)
+def test_no_import_waits_until_a_robot_is_open(opening: str) -> None:
+    code = (
+        f"{OPENINGS[opening]}\n"
+        "class Backend:\n"
+        "    def open(self, *_): raise InterruptedError\n"
+        "module.load_backend = lambda name: Backend()\n"
+        "try: start()\n"
+        "except InterruptedError: pass\n"
+    )
+    assert "numba" in loaded_after(code)

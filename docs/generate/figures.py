@@ -29,7 +29,7 @@ def figure(value: Any, row: dict[str, Any]) -> str:
     if isinstance(value, dict) and "count" in value:
         return f"{value['count']} ({value['lo']:.2g}-{value['hi']:.2g} an hour)"
     if isinstance(value, dict):
-        middle = next(value[k] for k in ("mean", "value", "median", "r") if k in value)
+        middle = next(value[k] for k in ("mean", "value", "median", "r", "difference") if k in value)
         interval = f" [{value['lo']:.{digits}f}, {value['hi']:.{digits}f}]" if value.get("lo") is not None else ""
         between = f" ({value['min']:.{digits}f} to {value['max']:.{digits}f})" if "min" in value else ""
         return f"{middle:.{digits}f}{after}{interval}{between}"

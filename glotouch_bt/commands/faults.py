@@ -17,7 +17,7 @@ def faults(
 ) -> None:
     """List the faults of a fault plan, or describe one.
 
-    `glotouch run MISSION --faults FILE` runs a plan.
+    `glotouch run MISSION --faults PLAN` runs a plan.
     """
     from glotouch_bt.commands.terminal import print_table
     from glotouch_bt.faults import CATALOGUE

@@ -21,7 +21,9 @@ def run(
     allow_path: shared.AllowPaths = None,
     conditions: shared.Conditions = "nominal",
     set_condition: shared.SetConditions = None,
-    faults: Annotated[str | None, typer.Option(metavar="FILE", help="a fault plan (see: glotouch faults)")] = None,
+    faults: Annotated[
+        str | None, typer.Option(metavar="PLAN", help="a fault plan, file or shipped name (see: glotouch faults)")
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="the run's folder (default: runs/...)")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the run that --out holds")] = False,
     live: shared.Live = False,

@@ -11,6 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from glotouch_bt.campaign import write_summary
+from glotouch_bt.lazy import load_all
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
 from glotouch_bt.motion import Kinematics
@@ -78,6 +79,7 @@ def run_study(study: LinkStudy, on_progress: Callable[[float], None] | None = No
     """
     world = load_mission(study.mission, {}).world
     backend = load_backend(study.backend)
+    load_all()  # a driver stops the arm when the client is silent for as long as an import takes
     walls, latencies, blocks = [], [], []
     with backend.open(world, load_conditions("nominal"), 0, study.options) as robot:
         kinematics = Kinematics(robot.description)

@@ -42,6 +42,7 @@ class FeltSpace:
         self._hand_K_m: Array
         self._touched_K_m: Array
         self._met_K_m: list[Array]
+        self._moved: Array
         self.forget()
 
     def add(self, path_K_m: Array, touch_K_m: Array | None = None) -> None:
@@ -66,7 +67,7 @@ class FeltSpace:
     def forget(self) -> None:
         """Remove everything: the objects may have been moved, or the tool was not held."""
         self._free_K_m, self._hand_K_m, self._touched_K_m = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2))
-        self._met_K_m = []
+        self._met_K_m, self._moved = [], np.zeros((0, 3))
 
     def forget_free_near(self, place_K_m: Array) -> None:
         """Remove the free space that was felt within `HANDLED_M` of a place (2 or 3,): something stands in it."""
@@ -78,6 +79,14 @@ class FeltSpace:
         """Remove what was felt within `HANDLED_M` of a place (2 or 3,): the jaws move what they close on."""
         self.forget_free_near(place_K_m)
         self._met_K_m = [met for met in self._met_K_m if _away_m(met, place_K_m).min() > HANDLED_M]
+        self._moved = self._moved[_away_m(self._moved, place_K_m) > HANDLED_M]
+
+    def moved_a_little(self, place_K_m: Array, share: float) -> None:
+        """Record that jaws moved what stands at a place (2,) by a share of the motion at which everything near is
+        forgotten; it is once the shares add up to 1."""
+        self._moved = np.concatenate([self._moved, [[*np.asarray(place_K_m)[:2], share]]])
+        if self._moved[_away_m(self._moved, place_K_m) <= HANDLED_M, 2].sum() >= 1.0:
+            self.forget_near(place_K_m)
 
     def met_below(self, places_K_m: Array, tip_K_m: float) -> float | None:
         """Return the height in K at which a fingertip that goes down to `tip_K_m` will meet what one met before.
@@ -121,6 +130,7 @@ class FeltSpace:
             "hand_K_m": self._hand_K_m.copy(),
             "touched_K_m": self._touched_K_m.copy(),
             "met_K_m": [met.copy() for met in self._met_K_m],
+            "moved": self._moved.copy(),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -129,6 +139,7 @@ class FeltSpace:
         self._hand_K_m = np.array(state["hand_K_m"], dtype=np.float64).reshape(-1, 3)
         self._touched_K_m = np.array(state["touched_K_m"], dtype=np.float64).reshape(-1, 2)
         self._met_K_m = [np.array(met, dtype=np.float64).reshape(-1, 3) for met in state["met_K_m"]]
+        self._moved = np.array(state["moved"], dtype=np.float64).reshape(-1, 3)
 
 
 def _away_m(places_K_m: Array, place_K_m: Array) -> Array:
@@ -167,6 +178,11 @@ class ToolSeat:
         moved = self._now_B_m - self._first_B_m
         length = float(np.linalg.norm(moved))
         return np.array([*(moved * min(1.0, MAX_DISPLACEMENT_M / max(length, 1e-12))), 0.0])
+
+    @property
+    def tip_B_m(self) -> Array:
+        """(3,) horizontal offset of the held tool's tip from P by the last measurement; zero if it is not known."""
+        return np.zeros(3) if self._now_B_m is None else np.array([*self._now_B_m, 0.0])
 
     def state(self) -> dict[str, Any]:
         """Return the record, for `restore`."""

@@ -62,7 +62,7 @@ class GuardedSweep(Skill):
 
     SEARCH_EXHAUSTED = Failure(
         "search_exhausted",
-        "nothing is left to explore, or to reach; with an unknown number, hardly anything can be left",
+        "nothing is left to explore or to reach, or hardly anything can be left",
         advice="check expected_objects; a lower height_m meets flatter objects",
     )
     FAILURES: ClassVar = (*Explorer.FAILURES, MOTION_REFUSED)
@@ -95,7 +95,8 @@ class GuardedSweep(Skill):
         if sought.contact is None:
             self.exhausted = True
             of = f" of {belief.expected}" if belief.expected is not None else ""
-            why = left_in_words(self.chance_left) or "nothing unexplored is left"
+            known = "hardly one can be missing" if belief.complete else "nothing unexplored is left"
+            why = left_in_words(self.chance_left) or known
             raise self.SEARCH_EXHAUSTED(f"{why}; {belief.found}{of} objects were found", found=belief.found)
         self.contact = sought.contact
 

@@ -10,7 +10,7 @@ from glotouch_bt.motion import FREE_M_S, Motion, finger_outline_half_m, hand_pos
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD, MotionRefused, Pose
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import ABOVE_RATIO, OVER_TOP_M, glide, keeping_clear_of, rise_clear
+from glotouch_skills.common.hand import glide, keeping_clear_of, rise_clear, unfelt_paces
 from glotouch_skills.common.planning import Push, PushPlanner, after_push
 from glotouch_skills.make_space.push_guard import STABLE, TOUCHING_N, Felt, PushGuard, push_guard, standing_force_B_N
 
@@ -233,8 +233,7 @@ class Nudge(Skill):
             yield from arm.transit(high, height_B_m=float(high.position_m[2]), speed_m_s=p.travel_speed_m_s)
             free_B_N = yield from standing_force_B_N(arm)
             height = float(container.pose_B_K.inverse().apply(high.position_m)[2]) - tips
-            beside = max(height - top_m - OVER_TOP_M, 0.0)
-            paces = ((0.0, ABOVE_RATIO * p.descent_speed_m_s), (beside, p.descent_speed_m_s))
+            paces = unfelt_paces(height, top_m, p.descent_speed_m_s)
             reached = yield from glide(self.context, low, FREE_M_S, paces, BUMP_N)
         behind, ahead = moving.span_m(push.yaw_K_rad)
         may_topple = 0.5 * (ahead - behind) < STABLE * moving.height_m

@@ -212,7 +212,7 @@ class TouchNext(Skill):
         standing = None
         if down is not None:
             standing = Standing(down.candidate.index, down.at, float(pose_K_P.position_m[2]))
-        found = options(belief.touchsets, standing, pose_K_P.position_m, arm.description.gripper, p)
+        found = options(belief.touchsets, standing, pose_K_P.position_m, arm.felt, arm.description.gripper, p)
         found = [o for o in found if _key(o) not in self.refused and o.closure.candidate not in self._hopeless]
         later = self._unmeasured(belief)
         found = [replace(o, seconds=o.seconds + MEASURE_S) if o.closure.candidate in later else o for o in found]
@@ -269,7 +269,7 @@ class TouchNext(Skill):
         """Return the candidates for whose closures space should be made, most probable first."""
         p, arm = self.params, self.context.arm
         hand_K_m = (self.context.world.container.pose_B_K.inverse() @ arm.pose_B_P).position_m
-        found = options(belief.touchsets, None, hand_K_m, arm.description.gripper, p)
+        found = options(belief.touchsets, None, hand_K_m, arm.felt, arm.description.gripper, p)
         later = self._unmeasured(belief)
         refused = [o for o in found if _key(o) in self.refused and o.closure.candidate not in later]
         wanted = recognition.wanted(belief, p.confidence, self._hopeless) | recognition.hardly_felt(belief)

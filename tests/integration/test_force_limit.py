@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -84,3 +86,17 @@ def test_an_object_that_is_dropped_in_the_lift_is_not_reported_as_lifted(faulted
     given = {"opening_m": 0.08, "duration_s": 10}
     result = faulted("pick_at", "grip_drop", given, {"node": "lift", "after_s": 0.5})
     assert (result["status"], result["reason_chain"][-1]["code"]) == ("failure", "lost")
+
+
+@pytest.mark.parametrize(("seed", "aside_mm"), [(53657, 4.3), (53749, 5.4)])
+def test_a_tilted_shaft_passes_through_its_slot_both_ways(tmp_path: Path, seed: int, aside_mm: float) -> None:
+    """The slot leaves the ball 2.5 mm. The hand gives way on the way out, and stands aside on the way in."""
+    text = (
+        "mission: there_and_back\nworld: container_five\ntree: {sequence: [tool_pickup, tool_calibrate, tool_return]}\n"
+    )
+    (tmp_path / "there_and_back.yaml").write_text(text)
+    request = RunRequest(str(tmp_path / "there_and_back.yaml"), seed=seed, conditions="harsh", report=False)
+    result = launch(replace(request, out=tmp_path / "run")).result
+    assert result["status"] == "success"
+    assert 1e3 * math.hypot(*result["calibration"]["tip_P_m"][:2]) == pytest.approx(aside_mm, abs=0.2)
+    assert 10.0 < result["true_peak_force_N"] < Limits().hard_force_N

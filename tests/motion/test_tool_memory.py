@@ -69,6 +69,24 @@ def test_what_the_jaws_handled_is_forgotten() -> None:
     assert felt.free_down_to(np.array([[0.25, 0.0]]), 0.005) == 0.0
 
 
+def test_small_motions_of_what_stands_near_add_up() -> None:
+    felt, other = FeltSpace(), FeltSpace()
+    felt.add(path(0.0, 0.3))
+    near, far = np.array([[0.05, 0.0]]), np.array([[0.25, 0.0]])
+    felt.moved_a_little(near[0], 0.4)
+    felt.moved_a_little(far[0], 0.9)
+    other.restore(felt.state())
+    for record in (felt, other):
+        record.moved_a_little(near[0], 0.4)
+        assert record.free_down_to(near, 0.005) == 0.0
+        record.moved_a_little(near[0] + 0.01, 0.4)
+        assert record.free_down_to(near, 0.005) == np.inf
+        assert record.free_down_to(far, 0.005) == 0.0
+        record.add(path(0.0, 0.1))
+        record.moved_a_little(near[0], 0.9)
+        assert record.free_down_to(near, 0.005) == 0.0, "what was felt anew counts anew"
+
+
 def test_what_a_fingertip_met_is_kept_until_jaws_close_near_it() -> None:
     felt, other = FeltSpace(), FeltSpace()
     places = np.array([[0.0, 0.0], [0.005, 0.0], [0.010, 0.0], [0.015, 0.0]])
@@ -110,7 +128,9 @@ def test_a_released_tool_has_no_displacement_until_it_is_measured_again() -> Non
     seat = ToolSeat()
     seat.measured(np.zeros(2))
     seat.measured(np.array([5e-4, 0.0]))
+    np.testing.assert_array_equal(seat.tip_B_m, [5e-4, 0.0, 0.0])
     seat.released()
+    np.testing.assert_array_equal(seat.tip_B_m, np.zeros(3))
     np.testing.assert_array_equal(seat.displacement_B_m, np.zeros(3))
     seat.measured(np.array([5e-4, 0.0]))
     np.testing.assert_allclose(seat.displacement_B_m, [5e-4, 0.0, 0.0])

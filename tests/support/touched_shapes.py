@@ -23,6 +23,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from glotouch_backends.rizon4 import XENSE_GRIPPER
+from glotouch_bt.motion import FeltSpace
 from glotouch_bt.perception.recognition import (
     MATCHERS,
     Belief,
@@ -148,7 +149,7 @@ def check_belief(belief: Belief) -> None:
 
 def choose(belief: Belief, p: ClosureParams) -> Option | None:
     """Return the closure that `touch_next` would make, were there no neighbours or walls."""
-    found = options(belief.touchsets, None, np.array([0.0, 0.0, 0.15]), XENSE_GRIPPER, p)
+    found = options(belief.touchsets, None, np.array([0.0, 0.0, 0.15]), FeltSpace(), XENSE_GRIPPER, p)
     if not found:
         return None
     closures: list[Closure] = [c for o in found for c in (o.closure, *o.after)]

@@ -33,10 +33,11 @@ MAX_MOVES = 5000
 
 @dataclass(frozen=True)
 class Traced:
-    """A candidate, and the planar travel at which it (or the last part of it) was traced."""
+    """A candidate, the planar travel at which it (or the last part of it) was traced, and its states before."""
 
     travel_m: float
     candidate: Candidate
+    earlier: tuple[Traced, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -124,13 +125,16 @@ def explore(
             )
             admitted = drive(plan, execute)[0]
             belief, candidates = admitted.belief, admitted.candidates
-            found = {
-                c.index: Traced(world.travel_m, c) if c.index in admitted.changed else found[c.index]
-                for c in candidates
-            }
+            current = {c.index: c for c in candidates}
+            found |= {i: _again(found.get(i), world.travel_m, current[i]) for i in admitted.changed}
+            found = {i: found[i] for i in current}
     except _OutOfBudget:
         ended = "budget"
     return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, tuple(maps))
+
+
+def _again(before: Traced | None, travel_m: float, candidate: Candidate) -> Traced:
+    return Traced(travel_m, candidate, () if before is None else (*before.earlier, before))
 
 
 def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDGET_M) -> tuple[Traced, ...]:

@@ -23,11 +23,12 @@ class Found:
     """A candidate to score.
 
     Attributes:
-        travel_m: Planar travel when it was added.
+        travel_m: Planar travel when it was last traced; `known_from_m` is the travel that counts as its discovery.
         centre_K_m: (2,) centre of its contour.
         kind: Kind of its contour.
         yaw_rad: Direction of its long side.
         height_m: Height of its top above the floor; None if not touched.
+        earlier: Travel and centre (2,) each time it was traced before, in order.
     """
 
     travel_m: float
@@ -35,6 +36,16 @@ class Found:
     kind: ContourKind
     yaw_rad: float
     height_m: float | None = None
+    earlier: tuple[tuple[float, Array], ...] = ()
+
+    def known_from_m(self, place_K_m: Array) -> float:
+        """Return the travel from which on its centre is within `DISCOVERED_M` of a place (2,)."""
+        travel_m = self.travel_m
+        for before_m, centre in reversed(self.earlier):
+            if float(np.linalg.norm(centre - place_K_m)) > DISCOVERED_M:
+                break
+            travel_m = before_m
+        return travel_m
 
 
 @dataclass(frozen=True)
@@ -98,7 +109,8 @@ def errors(found: Found, i: int, layout: TrueLayout) -> dict[str, Any]:
 def score(found: Sequence[Found], layout: TrueLayout, measured: Sequence[Found] | None = None) -> dict[str, Any]:
     """Return `discovered_m` (travel at each discovery), `false_candidates`, and `candidates` (errors of each).
 
-    An object is discovered when its candidate was traced, or when it was refined if the trace was too far off.
+    An object is discovered as soon as its candidate lies within `DISCOVERED_M` of it and stays there: when it was
+    traced, or when it was refined if the trace was too far off.
 
     Args:
         found: Candidates when traced; they decide the assignment.
@@ -109,12 +121,12 @@ def score(found: Sequence[Found], layout: TrueLayout, measured: Sequence[Found] 
     whose = assign([*found, *final], layout)
     first, later = whose[: len(found)], whose[len(found) :]
     real = [
-        (replace(end, travel_m=(f if i is not None else end).travel_m), i if i is not None else j)
+        (end, j) if i is None else (replace(end, travel_m=f.travel_m, earlier=f.earlier), i)
         for f, end, i, j in zip(found, final, first, later, strict=True)
     ]
     mine = [(f, i) for f, i in real if i is not None]
     return {
-        "discovered_m": sorted(f.travel_m for f, _ in mine),
+        "discovered_m": sorted(f.known_from_m(layout.centres_K_m[i]) for f, i in mine),
         "false_candidates": len(found) - len(mine),
         "candidates": [errors(f, i, layout) for f, i in mine],
     }

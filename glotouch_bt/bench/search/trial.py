@@ -133,26 +133,29 @@ def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, 
     layout = true_layout(record.truth, pose_B_K, sections)
     way = TipPath.of(record)
     heights = {e.data["candidate"]: float(e.data["height_m"]) for e in record.of_kind("top")}
-    # An object traced in parts counts from its last part; if that was too far off, from its refinement.
-    last: dict[int, tuple[float, Any]] = {}
+    traced: dict[int, list[tuple[float, Any]]] = {}
     final: dict[int, tuple[float, Any]] = {}
     for e in record.of_kind("candidate"):
         index = int(e.data["candidate"]["index"])
         if index not in final or e.data["node"] != TOP_NODE:
             final[index] = (e.stamp_s, e.data["candidate"])
         if "displaced_m" in e.data:
-            last[index] = (e.stamp_s, e.data["candidate"])
-    found = [_found(way.travel_m(stamp), c, heights.get(i)) for i, (stamp, c) in sorted(last.items())]
-    measured = [_found(way.travel_m(final[i][0]), final[i][1], heights.get(i)) for i in sorted(last)]
+            traced.setdefault(index, []).append((way.travel_m(e.stamp_s), e.data["candidate"]))
+    found = [_found(*states[-1], heights.get(i), states[:-1]) for i, states in sorted(traced.items())]
+    measured = [_found(way.travel_m(final[i][0]), final[i][1], heights.get(i)) for i in sorted(traced)]
     row = score(found, layout, measured)
-    row["contacts"] = sum(len(c["contacts"]) for _, c in last.values())
+    row["contacts"] = sum(len(states[-1][1]["contacts"]) for states in traced.values())
     row["contact_gap_mm"] = _gaps(record, layout)
     return row | {"travel_m": way.total_m, "before_m": way.before_m}
 
 
-def _found(travel_m: float, candidate: Any, height_m: float | None) -> Found:
+def _found(travel_m: float, candidate: Any, height_m: float | None, earlier: Sequence[tuple[float, Any]] = ()) -> Found:
+    def centre(of: Any) -> Array:
+        return np.array(of["contour"]["centre_K_m"])
+
     contour = candidate["contour"]
-    return Found(travel_m, np.array(contour["centre_K_m"]), contour["kind"], float(contour["yaw_rad"]), height_m)
+    before = tuple((at_m, centre(state)) for at_m, state in earlier)
+    return Found(travel_m, centre(candidate), contour["kind"], float(contour["yaw_rad"]), height_m, before)
 
 
 def true_layout(truth: Any, pose_B_K: Pose, sections: dict[str, FeltSection]) -> TrueLayout:
@@ -262,4 +265,9 @@ def planar_trial(head: Row, mission: str, objects: Path | None, other_world: str
 
 
 def _planar(traced: Sequence[Traced]) -> list[Found]:
-    return [Found(t.travel_m, c.centre_K_m, c.kind, c.yaw_rad) for t in traced for c in [t.candidate.contour]]
+    found = []
+    for t in traced:
+        contour = t.candidate.contour
+        earlier = tuple((e.travel_m, e.candidate.contour.centre_K_m) for e in t.earlier)
+        found.append(Found(t.travel_m, contour.centre_K_m, contour.kind, contour.yaw_rad, earlier=earlier))
+    return found

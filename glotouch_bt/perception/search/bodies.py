@@ -10,7 +10,10 @@ realistic, seeds 53800-53804). They count as one body.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+import scipy
 
 from glotouch_bt.perception.search.map import Mask
 from glotouch_bt.perception.search.tracing import TraceParams
@@ -31,6 +34,13 @@ MIN_PART = 2
 CERTAIN_NATS = 60.0
 """Minimum gain of log evidence above which two neighbouring candidates are two bodies beyond doubt. Source: the largest
 gain of a single object was 65 in the layouts of `SEPARATE_NATS`."""
+CEILING_NATS = 120.0
+"""Gain of log evidence above which a larger gain says no more, even if one body would be larger than any object: the
+outline of a candidate that is hardly known may be far off. Source: 8 of 53 such pairs of `ONE_BODY` were one body."""
+ONE_BODY = {"intercept": -1.7, "per_nat": -0.02, "same_body": 1.5, "uncertain": 2.1}
+"""Log odds that two neighbouring candidates are one body: the intercept, and what each nat of gain, centres inside each
+other's envelope (`same_body`) and an uncertain candidate add. Source: logistic regression on 116 pairs, of which 23
+were one body (planar, seeds 61200-61220 of touching_five and 61200-61211 of close_five)."""
 KNOWN_QUALITY = 0.3
 """Minimum quality of a candidate beside another one that counts without doubt: the centre's standard deviation is below
 8 mm. Source: ours."""
@@ -84,10 +94,16 @@ def bodies(
     return tuple(sorted(parts, key=len, reverse=True))
 
 
-def doubtful_pairs(
-    candidates: tuple[Candidate, ...], radius_m: float, path_K_m: Array
-) -> tuple[tuple[Candidate, Candidate], ...]:
-    """Return the pairs of neighbours that may be one body, or of which one is hardly known; none without a ball.
+@dataclass(frozen=True)
+class Doubt:
+    """Two neighbours that may be one body, and the probability that they are."""
+
+    pair: tuple[Candidate, Candidate]
+    chance: float
+
+
+def doubts(candidates: tuple[Candidate, ...], radius_m: float, path_K_m: Array) -> tuple[Doubt, ...]:
+    """Return the neighbours that may be one body, or of which one is hardly known; none without a ball.
 
     Two neighbours may be one body if one outline of a plausible size explains their contacts nearly as well as two, or
     if the centre of one lies inside the other.
@@ -95,16 +111,18 @@ def doubtful_pairs(
     if radius_m == 0:
         return ()
     pairs = ((a, b) for i, b in enumerate(candidates) for a in candidates[:i])
-    return tuple((a, b) for a, b in pairs if _may_be_one(a, b, radius_m, path_K_m))
+    return tuple(d for a, b in pairs if (d := _doubt(a, b, radius_m, path_K_m)) is not None)
 
 
-def count_doubtful(pairs: tuple[tuple[Candidate, Candidate], ...]) -> int:
-    """Return the number of candidates that may be a part of another one: candidates less certain bodies."""
-    body = {c.index: c.index for pair in pairs for c in pair}
-    for a, b in pairs:
-        old, new = body[b.index], body[a.index]
-        body = {k: new if v == old else v for k, v in body.items()}
-    return len(body) - len(set(body.values()))
+def chance_of_fewer(found: tuple[Doubt, ...], surplus: int = 0) -> float:
+    """Return the probability that more than `surplus` pairs are one body each, the pairs taken as independent.
+
+    Then there are fewer bodies than candidates without the surplus.
+    """
+    number = np.ones(1)  # probability of each number of pairs
+    for d in found:
+        number = np.convolve(number, (1.0 - d.chance, d.chance))
+    return float(number[surplus + 1 :].sum())
 
 
 def distinct(candidates: tuple[Candidate, ...], preferred: frozenset[int] = frozenset()) -> tuple[Candidate, ...]:
@@ -135,13 +153,17 @@ def _depths_m(a: Candidate, b: Candidate) -> tuple[float, float]:
     return over, under
 
 
-def _may_be_one(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> bool:
-    """Return True if two candidates stand close and may be one body, or one of them is hardly known."""
+def _doubt(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> Doubt | None:
+    """Return the doubt about two candidates that stand close and may be one body, or of which one is hardly known."""
     if float(signed_distance(envelope(a), b.extent_K_m).min()) > BESIDE_M:
-        return False
-    if min(a.quality, b.quality) < KNOWN_QUALITY:
-        return True
-    return min(_depths_m(a, b)) < 0.0 or gain_of_two(a, b, radius_m, path_K_m) < CERTAIN_NATS
+        return None
+    uncertain = min(a.quality, b.quality) < KNOWN_QUALITY
+    gain = gain_of_two(a, b, radius_m, path_K_m)
+    if not uncertain and min(_depths_m(a, b)) >= 0.0 and gain >= CERTAIN_NATS:
+        return None
+    odds = ONE_BODY["intercept"] + ONE_BODY["per_nat"] * min(gain, CEILING_NATS)
+    odds += ONE_BODY["same_body"] * same_body(a, b) + ONE_BODY["uncertain"] * uncertain
+    return Doubt((a, b), float(scipy.special.expit(odds)))
 
 
 def gain_of_two(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) -> float:

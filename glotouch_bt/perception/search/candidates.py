@@ -11,9 +11,10 @@ import numpy as np
 from glotouch_bt.perception.search.bodies import (
     KNOWN_QUALITY,
     SEPARATE_NATS,
+    Doubt,
     bodies,
-    count_doubtful,
-    doubtful_pairs,
+    chance_of_fewer,
+    doubts,
     outline_of,
     same_body,
 )
@@ -22,12 +23,20 @@ from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams
 from glotouch_bt.perception.touch import (
     Candidate,
     Contact,
+    Contour,
     contour_quality,
     signed_distance,
     split_at_motion,
 )
-from glotouch_bt.perception.touch.outline import OutlineBelief, convex_hull, envelope, polygon_distance
-from glotouch_bt.robot import Array
+from glotouch_bt.perception.touch.outline import (
+    OutlineBelief,
+    area_and_centroid,
+    convex_hull,
+    envelope,
+    minimum_rectangle,
+    polygon_distance,
+)
+from glotouch_bt.robot import Array, ParamError
 
 MIN_CONTACTS = 3
 """Minimum number of contacts of a candidate's outline."""
@@ -67,14 +76,14 @@ class Admitted:
         candidates: All candidates.
         index: Index of the new or updated candidate; None if the trace gave none.
         changed: Indices of all new or updated candidates, `index` first: one contour may be several bodies.
-        doubtful: Pairs of neighbours that may be one body.
+        doubts: Neighbours that may be one body.
     """
 
     belief: SearchMap
     candidates: tuple[Candidate, ...]
     index: int | None
     changed: tuple[int, ...] = ()
-    doubtful: tuple[tuple[Candidate, Candidate], ...] = ()
+    doubts: tuple[Doubt, ...] = ()
 
 
 def admit(
@@ -127,7 +136,7 @@ def admit(
         every[index] = replace(better, index=index)
         if len(parts) > 1:
             every[index] = _with(every[index], body, outline)
-        belief = belief.with_exclusion(envelope(every[index]), exclusion_m, index)
+        belief = belief.with_exclusion(_occupied(every[index]), exclusion_m, index)
         changed.append(index)
     return _admitted(belief, every, radius, better.index, tuple(changed))
 
@@ -159,9 +168,24 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
     parts = tuple(sorted(parts, key=lambda body: -sum(id(c) in mine for c in body)))
     for index, body in zip(chain((whole, part), count(_next_index(admitted.candidates))), parts, strict=False):
         every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius))
-        belief = belief.with_exclusion(envelope(every[index]), exclusion_m, index)
+        belief = belief.with_exclusion(_occupied(every[index]), exclusion_m, index)
         changed = tuple(dict.fromkeys((*changed, index)))
     return _admitted(belief, every, radius, whole, changed)
+
+
+def _occupied(candidate: Candidate) -> Contour:
+    """Return where certainly nothing else stands: the envelope, or only the hull of the contacts if the centre is
+    uncertain. The search then also looks where such a candidate is only presumed.
+    """
+    if candidate.quality >= KNOWN_QUALITY:
+        return envelope(candidate)
+    try:
+        hull = convex_hull(np.array([c.point_K_m for c in candidate.contacts]))
+    except ParamError:
+        return envelope(candidate)
+    size, yaw = minimum_rectangle(hull)[1:]
+    middle = area_and_centroid(hull)[1]
+    return Contour("box", middle, (size[0], size[1]), yaw, 0.0, np.zeros(0), family="free", boundary_K_m=hull)
 
 
 def _next_index(candidates: Iterable[Candidate]) -> int:
@@ -171,10 +195,11 @@ def _next_index(candidates: Iterable[Candidate]) -> int:
 def _admitted(
     belief: SearchMap, every: dict[int, Candidate], radius_m: float, index: int, changed: tuple[int, ...]
 ) -> Admitted:
-    """Return the result, with the pairs of candidates that are doubtful now."""
+    """Return the result, with the doubts about neighbours."""
     candidates = tuple(every[i] for i in sorted(every))
-    pairs = doubtful_pairs(candidates, radius_m, belief.path_K_m)
-    return Admitted(belief.with_doubtful(count_doubtful(pairs)), candidates, index, changed, pairs)
+    found = doubts(candidates, radius_m, belief.path_K_m)
+    surplus = 0 if belief.expected is None else max(belief.found - belief.expected, 0)
+    return Admitted(belief.with_doubt(chance_of_fewer(found, surplus)), candidates, index, changed, found)
 
 
 def refined(before: Candidate, traced: OutlineTrace) -> Candidate | None:

@@ -82,7 +82,7 @@ def _next_check(admitted: Admitted, checked: set[int]) -> tuple[Candidate, Candi
     """
     ends = admitted.belief.expected is not None and admitted.belief.found >= admitted.belief.expected
     best: tuple[Candidate, Candidate] | None = None
-    for pair in admitted.doubtful:
+    for pair in (doubt.pair for doubt in admitted.doubts):
         indices = {c.index for c in pair}
         if indices & checked or not (ends or indices <= set(admitted.changed)):
             continue

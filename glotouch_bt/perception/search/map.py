@@ -24,8 +24,8 @@ KNOWN_M = 0.005
 FACING = -0.4
 """Minimum cosine between the force on the ball and the direction from an object's centre to the contact for the contact
 to belong to the object."""
-DOUBT_LEFT = 0.05
-"""Probability that an object would have been missed below which a search ends with doubtful objects counted."""
+MISSED_BELOW = 0.02
+"""Chance that one of a known number of objects is missing, below which the search ends. Source: ours."""
 WALL_M = 0.003
 """Maximum distance from a wall of a contact with it. Source: ours; no object is as thin."""
 WALL_COSINE = 0.9
@@ -74,7 +74,7 @@ class SearchMap:
         hints: Contacts with other objects during a trace; the search visits them first.
         left_below: With an unknown number, the chance that something is left below which the search is complete.
         interior_m: Length and width of the container's interior; None: its walls are unknown.
-        doubtful: Number of traced objects that may be parts of other ones.
+        doubt: Probability that there are fewer bodies than the known number, although as many objects are traced.
     """
 
     half_extent_m: Array
@@ -85,7 +85,7 @@ class SearchMap:
     hints: tuple[Contact, ...] = ()
     left_below: float = LEFT_BELOW
     interior_m: tuple[float, float] | None = None
-    doubtful: int = 0
+    doubt: float = 0.0
 
     @classmethod
     def blank(
@@ -131,7 +131,8 @@ class SearchMap:
         """Add a traced object, or replace the exclusion of a known one: where it no longer is may be searched again.
 
         Args:
-            contour: Its envelope. Contacts outside the outline widen the margin, by 10 mm at most.
+            contour: Where certainly nothing else stands, such as its envelope. Contacts outside the outline widen the
+                margin, by 10 mm at most.
             margin_m: Distance that the tip's centre keeps from the envelope.
             index: Index of the object; None: a new one.
         """
@@ -161,9 +162,9 @@ class SearchMap:
         disc = Contour("round", point, (2 * radius_m, 2 * radius_m), 0.0, 0.0, np.zeros(0))
         return replace(self, exclusions=(*self.exclusions, Exclusion(disc, 0.0)))
 
-    def with_doubtful(self, doubtful: int) -> SearchMap:
-        """Set the number of traced objects that may be parts of other ones."""
-        return replace(self, doubtful=doubtful)
+    def with_doubt(self, doubt: float) -> SearchMap:
+        """Set the probability that there are fewer bodies than traced objects."""
+        return replace(self, doubt=doubt)
 
     def with_hints(self, contacts: tuple[Contact, ...]) -> SearchMap:
         """Replace the hints."""
@@ -250,18 +251,27 @@ class SearchMap:
         floor_m2 = float(np.prod(2.0 * (self.half_extent_m + self.prior.wall_m)))
         return chance_left(self.hidden.share, self.found, floor_m2)
 
+    @cached_property
+    def chance_missed(self) -> float:
+        """Probability that one of a known number of objects is missing although as many are traced.
+
+        By Bayes' rule from the doubt d, and the share h of places where the missing one would not have been met yet:
+        d h / (d h + 1 - d).
+        """
+        missed = self.doubt * self.anywhere.share if self.doubt > 0.0 else 0.0
+        return missed / (missed + 1.0 - self.doubt) if missed > 0.0 else 0.0
+
     @property
     def complete(self) -> bool:
         """True if all expected objects are traced; for an unknown number, if hardly anything can be left.
 
-        Doubtful objects do not count while one of the usual size could have been missed anywhere.
-        A hint that is not followed yet is an object that is left.
+        Of a doubtful number (`MISSED_BELOW`), a hint that is not followed yet may be the object that is missing.
         """
-        if self.expected is not None:
-            if self.found < self.expected:
-                return False
-            return self.found - self.doubtful >= self.expected or self.anywhere.share < DOUBT_LEFT
-        return not self.hints and self.chance_left < self.left_below
+        if self.expected is None:
+            return not self.hints and self.chance_left < self.left_below
+        if self.found < self.expected:
+            return False
+        return self.doubt < MISSED_BELOW or (not self.hints and self.chance_missed < MISSED_BELOW)
 
     @cached_property
     def _tree(self) -> scipy.spatial.cKDTree:

@@ -63,13 +63,14 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
         lowered: The ball is at sensing height.
     """
     tip, hops, cornered = np.asarray(tip_K_m, dtype=np.float64)[:2], 0, False
-    while lowered and belief.hints:
-        hint, belief = belief.hints[0], belief.with_hints(belief.hints[1:])
-        belief, contact, tip = yield from _follow(belief, hint, tip)
-        if contact is not None:
-            outcome = yield Move("retreat", tip - RETREAT_M * contact.approach_K[:2])
-            return Sought(belief.with_path(outcome.path_K_m), contact, True)
-    while not belief.complete:
+    while (lowered and belief.hints) or not belief.complete:
+        if lowered and belief.hints:
+            hint, belief = belief.hints[0], belief.with_hints(belief.hints[1:])
+            belief, contact, tip = yield from _follow(belief, hint, tip)
+            if contact is not None:
+                outcome = yield Move("retreat", tip - RETREAT_M * contact.approach_K[:2])
+                return Sought(belief.with_path(outcome.path_K_m), contact, True)
+            continue
         before, stretch = belief, policy.next_stretch(belief, tip)
         if stretch is not None and (cornered or not lowered) and not stretch.raised:
             stretch = None

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.motion import FREE_M_S, Arm, Motion, Paces
+from glotouch_bt.motion import FREE_M_S, Arm, FeltSpace, Motion, Paces
 from glotouch_bt.robot import Array, Pose
 from glotouch_bt.skill import Context
-from glotouch_skills.common.hand.fingertips import ALONG, fingertip_places, fingertips_K_m
+from glotouch_skills.common.hand.fingertips import fingertips_K_m, inner_edges
 from glotouch_skills.common.hand.hand import glide
 
 BESIDE_M_S = 0.03
@@ -43,13 +43,8 @@ def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, sl
         MotionRefused: Before moving.
     """
     arm = context.arm
-    edges = _inner_edges(arm, goal_B_P, opening_m)
-    tips = fingertips_K_m(arm, arm.pose_B_P)
-    beside = max(tips - top_m - OVER_TOP_M, 0.0)
-    paces: Paces = ((0.0, ABOVE_RATIO * slow_m_s), (beside, slow_m_s))
-    free_m = arm.felt.free_down_to(edges, FELT_WITHIN_M)
-    if np.isfinite(free_m):
-        paces = ((0.0, FREE_M_S), (beside, BESIDE_M_S), (max(tips - max(free_m, FOOT_M), beside), slow_m_s))
+    edges = _edges_under(arm, goal_B_P, opening_m)
+    paces = descent_paces(arm.felt, edges, fingertips_K_m(arm, arm.pose_B_P), top_m, slow_m_s)
     reached = yield from glide(context, goal_B_P, FREE_M_S, paces)
     if reached:
         note_open_fingers(arm)
@@ -58,11 +53,37 @@ def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, sl
     return reached
 
 
+def descent_paces(felt: FeltSpace, edges_K_m: Array, tips_K_m: float, top_m: float, slow_m_s: float) -> Paces:
+    """Return the speeds of a descent of the fingertips, each from a distance below `tips_K_m` on.
+
+    Args:
+        felt: Where the probe and the fingers stood.
+        edges_K_m: (n, 2) places under the inner edges of the fingertips.
+        tips_K_m: Height of the fingertips above the floor at the start.
+        top_m, slow_m_s: As for `descend`.
+    """
+    free_m = felt.free_down_to(edges_K_m, FELT_WITHIN_M)
+    if not np.isfinite(free_m):
+        return unfelt_paces(tips_K_m, top_m, slow_m_s)
+    beside = max(tips_K_m - top_m - OVER_TOP_M, 0.0)
+    return (0.0, FREE_M_S), (beside, BESIDE_M_S), (max(tips_K_m - max(free_m, FOOT_M), beside), slow_m_s)
+
+
+def unfelt_paces(tips_K_m: float, top_m: float, slow_m_s: float) -> Paces:
+    """Return the speeds, as `descent_paces`, where nothing was felt."""
+    return (0.0, ABOVE_RATIO * slow_m_s), (max(tips_K_m - top_m - OVER_TOP_M, 0.0), slow_m_s)
+
+
+def seconds_at(paces: Paces, length_m: float) -> float:
+    """Return the time of a straight way at the given speeds, without starting and stopping."""
+    ends = [min(begin, length_m) for begin, _ in paces[1:]] + [length_m]
+    return sum(max(end - begin, 0.0) / speed for (begin, speed), end in zip(paces, ends, strict=True))
+
+
 def note_open_fingers(arm: Arm) -> None:
     """Record that the open fingers stand free where they are."""
-    arm.felt.add_hand(_inner_edges(arm, arm.pose_B_P, arm.aperture_m), fingertips_K_m(arm, arm.pose_B_P))
+    arm.felt.add_hand(_edges_under(arm, arm.pose_B_P, arm.aperture_m), fingertips_K_m(arm, arm.pose_B_P))
 
 
-def _inner_edges(arm: Arm, goal_B_P: Pose, opening_m: float) -> Array:
-    """Return places (n, 2) in K on the inner edges of both fingers at a pose."""
-    return np.concatenate(fingertip_places(arm, goal_B_P, opening_m)[:, :ALONG])
+def _edges_under(arm: Arm, pose_B_P: Pose, opening_m: float) -> Array:
+    return inner_edges(arm.description.gripper, arm.world.container.pose_B_K.inverse() @ pose_B_P, opening_m)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from glotouch_bt.motion import Arm, Motion
-from glotouch_bt.robot import Array, Observation, Pose
+from glotouch_bt.robot import Array, Gripper, Observation, Pose
 
 ALONG, ACROSS = 5, 3
 """Number of places under a fingertip along x_P and along y_P."""
@@ -20,14 +20,23 @@ Source: ours; a force on both fingers alike lies in the middle."""
 
 def fingertip_places(arm: Arm, pose_B_P: Pose, opening_m: float) -> Array:
     """Return places (2, n, 2) in K under the right and the left fingertip (-y_P, +y_P), those of inner edges first."""
-    finger = arm.description.gripper.finger
+    pose_K_P = arm.world.container.pose_B_K.inverse() @ pose_B_P
+    return _places(arm.description.gripper, pose_K_P, opening_m)
+
+
+def inner_edges(gripper: Gripper, pose_K_P: Pose, opening_m: float) -> Array:
+    """Return places (n, 2) in K under the inner edges of both fingertips."""
+    return np.concatenate(_places(gripper, pose_K_P, opening_m)[:, :ALONG])
+
+
+def _places(gripper: Gripper, pose_K_P: Pose, opening_m: float) -> Array:
+    finger = gripper.finger
     x, y = (
         centre + half * np.linspace(-1.0, 1.0, count)
         for centre, half, count in zip(finger.centre_m, finger.half_m, (ALONG, ACROSS), strict=False)
     )
     across, along = (a.ravel() for a in np.meshgrid(y + 0.5 * opening_m, x, indexing="ij"))
     places_P = np.array([np.column_stack([along, side * across, 0.0 * along]) for side in (-1.0, 1.0)])
-    pose_K_P = arm.world.container.pose_B_K.inverse() @ pose_B_P
     return np.asarray([pose_K_P.apply(places)[:, :2] for places in places_P])
 
 

@@ -162,7 +162,7 @@ class Squeezing:
 
     def _close(self) -> Motion[tuple[Layer, ObjectMotion]]:
         p, arm = self._p, self._context.arm
-        gripper = arm.description.gripper
+        gripper, felt = arm.description.gripper, arm.felt.state()
         closing: list[Observation] = []
         if p.gel_images:
             closing.append((yield Command(tactile=True, images=True)))  # of the untouched gels
@@ -193,6 +193,9 @@ class Squeezing:
             noise_m=noise_m,
             relief=relief_of_closure(closing, blocks, gripper),
         )
+        if layer.stable and object_motion.detected:  # what was felt beside it holds until such motions add up
+            arm.felt.restore(felt)
+            arm.felt.moved_a_little(self.at.position_K_m, object_motion.share)
         yield from release(arm, self.at.opening_m)
         true_m = layer.aperture_m - self._zero.error_m
         return replace(layer, aperture_m=true_m, zero_sd_m=self._zero.sd_m), object_motion

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glotouch_bt.motion import FeltSpace
 from glotouch_bt.perception.recognition import Closure
 from glotouch_bt.perception.touch import Candidate, TouchSet
-from glotouch_bt.robot import Array, Gripper
-from glotouch_skills.common.hand import ABOVE_RATIO, OVER_TOP_M
+from glotouch_bt.robot import Array, Gripper, Pose
+from glotouch_skills.common.hand import descent_paces, inner_edges, seconds_at
 from glotouch_skills.common.planning.squeeze_motion import FAST_RISE_RATIO, ClosureParams, layer_heights
 from glotouch_skills.common.planning.squeeze_plan import Stance, schemes, stance
 
@@ -100,7 +101,12 @@ def beside(touchset: TouchSet, at: Stance, gripper: Gripper, side_gap_m: float) 
 
 
 def options(
-    touchsets: Sequence[TouchSet], standing: Standing | None, hand_K_m: Array, gripper: Gripper, p: ClosureParams
+    touchsets: Sequence[TouchSet],
+    standing: Standing | None,
+    hand_K_m: Array,
+    felt: FeltSpace,
+    gripper: Gripper,
+    p: ClosureParams,
 ) -> list[Option]:
     """Return all closures that could come next and were not made yet.
 
@@ -111,6 +117,7 @@ def options(
         touchsets: Touches so far, one set a candidate.
         standing: Stance of the lowered open hand, or None if it is high.
         hand_K_m: (3,) pads' mid-point.
+        felt: Where the probe and the fingers stood: there, the fingers come down faster.
         gripper: The robot's gripper.
         p: Parameters of the closures.
     """
@@ -127,7 +134,7 @@ def options(
             if _used(touchset, at):
                 continue
             lowest, *higher = (_closure(candidate, at, float(z)) for z in heights)
-            seconds = _travel_s(candidate, at, float(heights[0]), hand_K_m, p) + CLOSURE_S
+            seconds = _travel_s(candidate, at, float(heights[0]), hand_K_m, felt, gripper, p) + CLOSURE_S
             gap = float(np.ptp(heights)) / max(len(heights) - 1, 1)
             more = CLOSURE_S + STOP_S + gap / (FAST_RISE_RATIO * p.descent_speed_m_s)
             out.append(Option(at, lowest, seconds, tuple(higher), more))
@@ -162,14 +169,20 @@ def _used(touchset: TouchSet, at: Stance) -> bool:
     return False
 
 
-def _travel_s(candidate: Candidate, at: Stance, height_m: float, hand_K_m: Array, p: ClosureParams) -> float:
-    """Return the time of moving up, across and down to `height_m` beside the candidate."""
-    high = p.headroom_m
+def _travel_s(
+    candidate: Candidate,
+    at: Stance,
+    height_m: float,
+    hand_K_m: Array,
+    felt: FeltSpace,
+    gripper: Gripper,
+    p: ClosureParams,
+) -> float:
+    """Return the time of moving to the headroom, across, and down to `height_m` beside the candidate."""
+    below = gripper.fingertip_below_P_m
     across = float(np.linalg.norm(at.position_K_m - hand_K_m[:2]))
-    up = max(high - float(hand_K_m[2]), 0.0)
-    careful = max(min(candidate.height_m + OVER_TOP_M, high) - height_m, 0.0)
-    quick = max(high - candidate.height_m - OVER_TOP_M, 0.0)
-    way = (
-        (up + across) / p.travel_speed_m_s + quick / (ABOVE_RATIO * p.descent_speed_m_s) + careful / p.descent_speed_m_s
-    )
-    return way + TURN_S + 4 * STOP_S
+    up = abs(p.headroom_m + below - float(hand_K_m[2]))
+    edges = inner_edges(gripper, Pose.pointing_down(np.array([*at.position_K_m, height_m]), at.yaw_K_rad), at.opening_m)
+    paces = descent_paces(felt, edges, p.headroom_m, candidate.height_m, p.descent_speed_m_s)
+    down_s = seconds_at(paces, p.headroom_m + below - height_m)
+    return (up + across) / p.travel_speed_m_s + down_s + TURN_S + 4 * STOP_S

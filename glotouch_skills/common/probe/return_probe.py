@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from glotouch_bt.motion import FREE_M_S, Motion, MoveResult, Paces
-from glotouch_bt.robot import MotionRefused, Observation, Pose
+from glotouch_bt.robot import Array, MotionRefused, Observation, Pose
 from glotouch_bt.skill import Context, Failure, SkillRun
 from glotouch_skills.common.hand import (
     CAUGHT_N,
@@ -31,6 +31,15 @@ ENTRY_M = 0.02
 """Height of the ball above the holder from which the probe is lowered at the speed of the insertion. Source: ours."""
 SLOW_M_S = 0.01
 """Largest speed from there."""
+CENTRED_M = 0.0015
+"""Offset of the ball in the hand up to which it passes through the slot with the hand over the seat. Source: ours; the
+simulated slot leaves 2.5 mm on each side."""
+MAX_ASIDE_M = 0.004
+"""Largest shift of the hand beside the seat while the ball passes through the slot: the shaft stays clear of its sides.
+Source: ours; it has 4.5 mm on each side in the simulation."""
+BELOW_M = 0.006
+"""Clearance between the ball and the holder's lower edge from which the hand moves towards the seat. Source: ours; the
+height of the rails, which the holder's description leaves out, and a margin."""
 SEAT_M = 0.003
 """Height above its place from which the probe is lowered to its seat. Source: ours; a slip of 2 mm is found before."""
 SEAT_M_S = 0.003
@@ -110,18 +119,24 @@ def return_probe(
     seat = world.holder.pose_B_grasp.position_m - arm.tool_seat.displacement_B_m
     grasp = Pose.pointing_down(seat, yaw_B_rad)
     above = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, world.probe.length_m + 0.06]))
+    aside = _aside_m(arm.tool_seat.tip_B_m - arm.tool_seat.displacement_B_m)
+    entry = dataclasses.replace(above, position_m=above.position_m + aside)
     here = arm.pose_B_P.position_m
-    if here[2] > above.position_m[2] or np.linalg.norm(here[:2] - above.position_m[:2]) > OVER_HOLDER_M:
+    inside = any(np.linalg.norm(here[:2] - at.position_m[:2]) <= OVER_HOLDER_M for at in (above, entry))
+    if here[2] > above.position_m[2] or not inside:
         height = max(float(here[2]), float(above.position_m[2]))
-        yield from arm.transit(above, height_B_m=height, speed_m_s=speed_m_s)
-    near = dataclasses.replace(grasp, position_m=grasp.position_m + np.array([0.0, 0.0, SLOW_FROM_M]))
-    if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
-        outside = float(arm.pose_B_P.position_m[2] - grasp.position_m[2]) - world.probe.length_m - ENTRY_M
-        paces = ((0.0, max(FREE_M_S, insert_speed_m_s)), (max(outside, 0.0), insert_speed_m_s))
-        moved = yield from _lower(context, near, paces, aperture_m, MAX_INSERT_FORCE_N)
-        if (why := describe_stop(moved)) is not None:
-            yield from _rise(context, insert_speed_m_s)  # do not keep pressing on the holder
-            raise MotionRefused("into the holder", why)
+        yield from arm.transit(entry, height_B_m=height, speed_m_s=speed_m_s)
+    through_m = world.probe.length_m - 2.0 * world.holder.half_m[2] - world.probe.tip_radius_m - BELOW_M
+    stages = [(aside, through_m)] if aside.any() else []  # the ball through the slot, then the shaft over the seat
+    for beside, high_m in (*stages, (np.zeros(3), SLOW_FROM_M)):
+        near = dataclasses.replace(grasp, position_m=grasp.position_m + beside + np.array([0.0, 0.0, high_m]))
+        if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
+            outside = float(arm.pose_B_P.position_m[2] - grasp.position_m[2]) - world.probe.length_m - ENTRY_M
+            paces = ((0.0, max(FREE_M_S, insert_speed_m_s)), (max(outside, 0.0), insert_speed_m_s))
+            moved = yield from _lower(context, near, paces, aperture_m, MAX_INSERT_FORCE_N)
+            if (why := describe_stop(moved)) is not None:
+                yield from _rise(context, insert_speed_m_s)  # do not keep pressing on the holder
+                raise MotionRefused("into the holder", why)
     left = float(np.linalg.norm(arm.pose_B_P.position_m - grasp.position_m))
     paces = ((0.0, min(SLOW_M_S, insert_speed_m_s)), (left - SEAT_M, min(SEAT_M_S, insert_speed_m_s)))
     moved = yield from _lower(context, grasp, paces, aperture_m, MAX_INSERT_FORCE_N)
@@ -136,14 +151,24 @@ def return_probe(
     yield from set_payload_and_tare(context)
 
 
+def _aside_m(ball_B_m: Array) -> Array:
+    """Return the shift (3,) of the hand from over its seat that brings the ball over the middle of the slot.
+
+    Zero if the ball, beside the middle by `ball_B_m` (3,), passes anyway.
+    """
+    off = float(np.linalg.norm(ball_B_m))
+    return np.zeros(3) if off < CENTRED_M else -ball_B_m * min(1.0, MAX_ASIDE_M / off)
+
+
 def _lower(context: Context, goal: Pose, paces: Paces, aperture_m: float, max_N: float) -> Motion[MoveResult]:
-    """Move down to `goal`, until the force changes by more than `max_N`; `paces` begin at 0.
+    """Move straight to `goal`, until the force changes by more than `max_N`; `paces` begin at 0.
 
     Raises:
         SkillFailed: `tool_lost`; the hand has risen again.
     """
     arm = context.arm
-    straight = yield from straight_guard(arm, DOWN_B, max_N)
+    way = goal.position_m - arm.pose_B_P.position_m
+    straight = yield from straight_guard(arm, way if way.any() else DOWN_B, max_N)
     released = not arm.scene.holding_tool or np.linalg.norm(goal.position_m - arm.pose_B_P.position_m) < IN_PLACE_M
     guard = straight if released else Lowering(straight, aperture_m)  # released before a preemption
     moved = yield from arm.line(goal, paces[0][1], check=False, paces=paces, guard=guard)

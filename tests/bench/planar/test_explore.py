@@ -30,6 +30,10 @@ def test_two_cylinders_are_found_where_they_are(world_of: WorldOf, policy: str) 
     measured = np.array([t.candidate.contour.centre_K_m for t in refined])
     assert np.linalg.norm(measured[:, None] - centres_of(world)[None], axis=2).min(axis=0).max() < 0.002
     assert [t.travel_m for t in explored.found] == sorted(t.travel_m for t in explored.found)
+    again = [t for t in refined if t.earlier]
+    assert all(
+        t.earlier[-1].travel_m < t.travel_m and t.earlier[-1].candidate.index == t.candidate.index for t in again
+    )
 
 
 def test_an_empty_container_is_exhausted(world_of: WorldOf) -> None:

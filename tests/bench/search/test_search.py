@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -50,6 +51,12 @@ def test_a_wrong_outline_counts_when_it_is_refined():
     assert row["discovered_m"] == [2.0, 2.6]
     assert row["false_candidates"] == 0
     assert score(first, truth)["discovered_m"] == [2.0]
+
+
+def test_an_object_counts_from_when_on_its_candidate_stays_near():
+    near, far = np.array([0.011, 0.0]), np.array([0.05, 0.0])
+    candidate = replace(at(0.01, 0.0, 5.0), earlier=((1.0, near), (2.0, far), (3.0, near)))
+    assert score([candidate], layout((0.0, 0.0, 0.0)))["discovered_m"] == [3.0]
 
 
 @pytest.mark.parametrize(("off_mm", "found"), [(24.9, 1), (25.1, 0)])

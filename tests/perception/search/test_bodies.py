@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
+import glotouch_bt.perception.search.bodies as search_bodies
 from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit
-from glotouch_bt.perception.search.bodies import bodies, count_doubtful, distinct, doubtful_pairs, outline_of
+from glotouch_bt.perception.search.bodies import Doubt, bodies, chance_of_fewer, distinct, doubts, outline_of
 from glotouch_bt.perception.search.candidates import quality, regroup
 from glotouch_bt.perception.touch import Candidate, Contact
 
@@ -84,16 +88,50 @@ def test_a_contour_of_two_bodies_becomes_two_candidates_that_count() -> None:
 def test_parts_of_one_body_are_doubtful_and_bodies_far_apart_are_not() -> None:
     halves = candidate(0, LEFT[:3]), candidate(1, LEFT[3:])
     far = candidate(2, disc(0.1, 0.1, 0.03, (0, 60, 120, 180, 240, 300)))
-    pairs = doubtful_pairs((*halves, far), R, NO_PATH)
-    assert [(a.index, b.index) for a, b in pairs] == [(0, 1)]
-    assert count_doubtful(pairs) == 1
+    (doubt,) = doubts((*halves, far), R, NO_PATH)
+    assert [c.index for c in doubt.pair] == [0, 1]
 
 
-def test_candidates_are_counted_once_in_a_chain_of_doubtful_pairs() -> None:
-    a, b, c, d = (candidate(i, LEFT) for i in range(4))
-    assert count_doubtful(()) == 0
-    assert count_doubtful(((a, b), (b, c), (a, c))) == 2
-    assert count_doubtful(((a, b), (c, d))) == 2
+@pytest.mark.parametrize(
+    ("gain", "contacts", "qualities", "chance"),
+    [
+        (0.0, (LEFT[:3], LEFT[3:]), (0.5, 0.5), 1.0 / (1.0 + np.exp(1.7 - 1.5))),  # centres inside each other
+        (40.0, (LEFT[:3], LEFT[3:]), (0.5, 0.5), 1.0 / (1.0 + np.exp(1.7 + 0.8 - 1.5))),
+        (40.0, (LEFT, RIGHT), (0.5, 0.5), 1.0 / (1.0 + np.exp(1.7 + 0.8))),
+        (40.0, (LEFT, RIGHT), (0.5, 0.2), 1.0 / (1.0 + np.exp(1.7 + 0.8 - 2.1))),
+        (np.inf, (LEFT, RIGHT), (0.5, 0.2), 1.0 / (1.0 + np.exp(1.7 + 2.4 - 2.1))),
+        (61.0, (LEFT, RIGHT), (0.5, 0.5), None),  # two bodies beyond doubt
+    ],
+)
+def test_a_doubt_follows_from_evidence_overlap_and_quality(
+    monkeypatch: pytest.MonkeyPatch, gain: float, contacts: Any, qualities: tuple[float, float], chance: float | None
+) -> None:
+    monkeypatch.setattr(search_bodies, "gain_of_two", lambda *_: gain)
+    pair = tuple(replace(candidate(i, c), quality=q) for i, (c, q) in enumerate(zip(contacts, qualities, strict=True)))
+    found = [d.chance for d in doubts(pair, R, NO_PATH)]
+    assert found == ([] if chance is None else [pytest.approx(chance)])
+
+
+def test_the_chance_of_fewer_bodies_takes_pairs_as_independent() -> None:
+    pair = candidate(0, LEFT), candidate(1, RIGHT)
+    two = Doubt(pair, 0.5), Doubt(pair, 0.2)
+    assert chance_of_fewer(()) == 0.0
+    assert chance_of_fewer(two) == pytest.approx(0.6)
+    assert chance_of_fewer(two, surplus=1) == pytest.approx(0.1), "one more was traced than expected"
+    assert chance_of_fewer(two, surplus=2) == 0.0
+
+
+@pytest.mark.parametrize(("expected", "doubt"), [(3, True), (2, False)])
+def test_a_surplus_makes_up_for_a_doubtful_pair(expected: int, doubt: bool) -> None:
+    belief = SearchMap.blank((0.2, 0.15), expected=expected)
+    halves = candidate(0, LEFT[:3]), candidate(1, LEFT[3:5])
+    for c in halves:
+        belief = belief.with_exclusion(c.contour, 0.01)
+    far = disc(0.1, 0.1, 0.03, (0, 60, 120, 180, 240, 300))
+    traced = OutlineTrace(far, outline_of(far, R), np.zeros(2), NO_PATH)
+    admitted = admit(belief, halves, far[0], traced, 0.018, 0.01)
+    assert admitted.belief.found == 3
+    assert (admitted.belief.doubt > 0.0) is doubt
 
 
 def test_parts_that_turn_out_to_be_one_body_are_one_candidate() -> None:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit, joins, lost_among, of_another, part_of
-from glotouch_bt.perception.search.bodies import outline_of
+from glotouch_bt.perception.search.bodies import KNOWN_QUALITY, outline_of
 from glotouch_bt.perception.search.candidates import quality
-from glotouch_bt.perception.touch import Candidate, Contact
+from glotouch_bt.perception.touch import Candidate, Contact, signed_distance
 
 R = 0.006
 LIMB = ((0.0, 0.022, 0, 1), (0.0, -0.022, 0, -1), (0.012, 0.0, 1, 0))
@@ -113,7 +113,7 @@ def test_a_part_that_stands_out_costs_no_contact_and_is_checked():
     belief = SearchMap.blank((0.2, 0.15), expected=3).with_exclusion(known.contour, 0.01)
     admitted = admit(belief, (known,), nose[0], traced, 0.018, 0.01)
     assert sum(len(c.contacts) for c in admitted.candidates) == len(known.contacts) + len(nose)
-    assert len(admitted.candidates) == 1 + len(admitted.doubtful)
+    assert len(admitted.candidates) == 1 + len(admitted.doubts)
 
 
 def test_a_trace_round_a_neighbour_keeps_the_contacts_of_the_candidate_that_it_merges_with():
@@ -210,3 +210,18 @@ def test_a_contact_at_the_unknown_end_of_a_box_belongs_to_the_box():
     mine = ring(0.09, 0.0, 0.03, [0.0, 60.0, 120.0, 240.0, 300.0])
     assert of_another((box,), R, mine, contact(0.04, 0.005, 1, 0))
     assert not of_another((box,), R, mine, ring(0.09, 0.0, 0.03, [180.0])[0])
+
+
+def test_only_the_hull_of_an_uncertain_candidate_is_kept_free_of_sweeps(candidate):
+    """Five contacts on one end leave the other end open: nothing tells that it is the box's."""
+    belief = SearchMap.blank((0.2, 0.15), expected=2)
+    traced = OutlineTrace(candidate.contacts, outline_of(candidate.contacts, R), np.zeros(2), np.zeros((0, 2)))
+    admitted = admit(belief, (), candidate.contacts[0], traced, 0.018, 0.01)
+    assert admitted.candidates[0].quality < KNOWN_QUALITY
+    points = np.array([[0.0, 0.0], [0.022, 0.0]])  # between the contacts, and 12 mm beyond them
+    assert (signed_distance(admitted.candidates[0].contour, points) < 0.01).all(), "the margin of the outline has both"
+    np.testing.assert_array_equal(admitted.belief.inside_exclusion(points), [True, False])
+    certain = (*candidate.contacts, contact(0.04, 0.015, 1, 0), contact(0.04, -0.015, 1, 0))
+    traced = OutlineTrace(certain, outline_of(certain, R), np.zeros(2), np.zeros((0, 2)))
+    admitted = admit(belief, (), certain[0], traced, 0.018, 0.01)
+    np.testing.assert_array_equal(admitted.belief.inside_exclusion(points), [True, True])

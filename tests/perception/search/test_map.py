@@ -142,8 +142,13 @@ def test_a_contact_is_with_a_wall_if_the_wall_is_there_and_pushes_back(point, pu
 def test_a_doubtful_object_counts_once_hardly_anything_can_have_been_missed():
     found = SearchMap.blank((0.188, 0.138), expected=1).with_exclusion(DISC, 0.01)
     assert found.complete
-    doubtful = found.with_doubtful(1)
+    doubtful = found.with_doubt(0.5)
+    assert doubtful.chance_missed == pytest.approx(0.5), "nothing was searched yet"
     assert not doubtful.complete
     rows = np.arange(-0.138, 0.139, 0.012)
     x = np.tile([-0.188, 0.188, 0.188, -0.188], len(rows))[: 2 * len(rows)]
-    assert doubtful.with_path(np.column_stack([x, np.repeat(rows, 2)])).complete
+    swept = doubtful.with_path(np.column_stack([x, np.repeat(rows, 2)]))
+    assert swept.complete
+    hint = Contact(0.0, np.zeros(3), np.array([1.0, 0, 0]), np.array([-1.0, 0, 0]), np.array([0.1, 0.0]), 1.0)
+    assert not swept.with_hints((hint,)).complete, "what was met may be the one that is missing"
+    assert found.with_hints((hint,)).complete, "a number beyond doubt needs no hint"

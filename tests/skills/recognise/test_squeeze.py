@@ -9,6 +9,7 @@ import pytest
 from py_trees.common import Status
 
 import glotouch_skills.common.planning.squeeze_motion as motion
+from glotouch_bt.perception.touch import ObjectMotion
 from glotouch_skills.recognise.squeeze import Squeeze
 
 WIDTH = 0.05
@@ -144,3 +145,21 @@ def test_what_stands_still_is_not_reported_as_moved(make) -> None:
     b.run(skill)
     assert not b.of_kind("object_moved")
     assert all(abs(layer.slide_m) + abs(layer.turn_rad) + layer.compliance_m < 1e-6 for layer in skill.touchset.layers)
+
+
+@pytest.mark.parametrize(
+    ("slide_m", "stable", "kept"), [(0.0, True, True), (0.005, True, False), (0.0005, True, False), (0.0, False, False)]
+)
+def test_free_space_beside_an_object_is_kept_until_closures_have_moved_it(
+    make, monkeypatch, slide_m: float, stable: bool, kept: bool
+) -> None:
+    """Each of the closures slides it by `slide_m`; 0.5 mm is little, but there are many."""
+    felt_K_m = np.array([[0.06, 0.02, 0.018]])
+    slid, plain = ObjectMotion(slide_m, 0.0, 0.0, True), motion.make_layer
+    monkeypatch.setattr(motion, "estimate_object_motion", lambda *_, **__: slid)
+    if not stable:
+        monkeypatch.setattr(motion, "make_layer", Slippery(lambda _: True, plain))
+    b, skill = make()
+    b.arm.felt.add(felt_K_m)
+    b.run(skill)
+    assert np.isfinite(b.arm.felt.free_down_to(felt_K_m[:, :2], 0.001)) is np.bool_(kept)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import log_ndtr
+import scipy
 
 from glotouch_bt.perception.recognition.likelihood.contacts import SectionFit
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
@@ -65,7 +65,7 @@ def _height_density(off_m: Array, model: TargetModel, p: LikelihoodParams) -> Ar
     unsure_m = model.certainty.height_sd_m if model.certainty is not None else 0.0
     sd_m = math.hypot(p.height_sd_m, p.scale_sd * model.height_m, 2 * p.offset_sd_m, unsure_m)
     rise_m = p.lean_rad * RISE_SHARE * float(np.mean(model.outline.likely.size_m))
-    log_density = 0.5 * (sd_m / rise_m) ** 2 - off_m / rise_m + log_ndtr(off_m / sd_m - sd_m / rise_m)
+    log_density = 0.5 * (sd_m / rise_m) ** 2 - off_m / rise_m + scipy.special.log_ndtr(off_m / sd_m - sd_m / rise_m)
     return np.asarray(np.exp(log_density) / rise_m)
 
 

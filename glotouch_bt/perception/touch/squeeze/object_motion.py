@@ -59,13 +59,18 @@ class ObjectMotion:
     detected: bool
 
     @property
+    def share(self) -> float:
+        """The motion over that from which on the object counts as moved."""
+        return max(
+            abs(self.slide_m) / MOVED_SLIDE_M,
+            abs(self.turn_rad) / MOVED_TURN_RAD,
+            self.compliance_m / MOVED_COMPLIANCE_M,
+        )
+
+    @property
     def moved(self) -> bool:
         """True if the closure moved the object."""
-        return (
-            abs(self.slide_m) > MOVED_SLIDE_M
-            or abs(self.turn_rad) > MOVED_TURN_RAD
-            or self.compliance_m > MOVED_COMPLIANCE_M
-        )
+        return self.share > 1.0
 
 
 def estimate_object_motion(

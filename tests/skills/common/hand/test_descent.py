@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.motion import FREE_M_S, hand_pose_B
-from glotouch_skills.common.hand.descent import BESIDE_M_S, FOOT_M, OVER_TOP_M, descend
+from glotouch_skills.common.hand.descent import BESIDE_M_S, FOOT_M, OVER_TOP_M, descend, seconds_at
 
 OPENING, TOP, SLOW, HEADROOM, LOW = 0.06, 0.05, 0.01, 0.13, 0.005
 
@@ -34,3 +34,10 @@ def test_unknown_space_is_entered_slowly_and_felt_space_fast(bench) -> None:
     assert fall(b, felt=False) == pytest.approx(unknown, abs=0.5)
     assert fall(b, felt=False) < 0.6 * unknown, "the hand came down there before"
     assert fall(bench(), felt=True) == pytest.approx(known, abs=0.5)
+
+
+def test_the_time_of_a_way_at_several_speeds() -> None:
+    """0.1 m at 0.1 m/s, then 0.05 m at 0.01 m/s."""
+    paces = ((0.0, 0.1), (0.1, 0.01))
+    assert seconds_at(paces, 0.15) == pytest.approx(6.0)
+    assert seconds_at(paces, 0.05) == pytest.approx(0.5)
