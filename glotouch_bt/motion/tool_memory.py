@@ -82,8 +82,10 @@ class FeltSpace:
         self._moved = self._moved[_away_m(self._moved, place_K_m) > HANDLED_M]
 
     def moved_a_little(self, place_K_m: Array, share: float) -> None:
-        """Record that jaws moved what stands at a place (2,) by a share of the motion at which everything near is
-        forgotten; it is once the shares add up to 1."""
+        """Record a small motion of what stands at a place (2,), and forget what was felt near it once they add up to 1.
+
+        The share is 1 for a motion after which nothing that was felt near the object holds.
+        """
         self._moved = np.concatenate([self._moved, [[*np.asarray(place_K_m)[:2], share]]])
         if self._moved[_away_m(self._moved, place_K_m) <= HANDLED_M, 2].sum() >= 1.0:
             self.forget_near(place_K_m)

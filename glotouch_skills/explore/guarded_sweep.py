@@ -95,7 +95,7 @@ class GuardedSweep(Skill):
         if sought.contact is None:
             self.exhausted = True
             of = f" of {belief.expected}" if belief.expected is not None else ""
-            known = "hardly one can be missing" if belief.complete else "nothing unexplored is left"
+            known = "all expected objects are traced" if sought.belief.complete else "nothing unexplored is left"
             why = left_in_words(self.chance_left) or known
             raise self.SEARCH_EXHAUSTED(f"{why}; {belief.found}{of} objects were found", found=belief.found)
         self.contact = sought.contact

@@ -72,7 +72,7 @@ class OrbitProbe(Skill):
     map = Out(SearchMap, "the search map with the object excluded")
     candidates = Out(tuple, "candidates, the new one last", element=Candidate)
     found = Out(int, "number of traced objects")
-    complete = Out(bool, "all expected objects are traced; of an unknown number, hardly one can be missing")
+    complete = Out(bool, "all expected objects are traced beyond doubt; of an unknown number, hardly one is left")
     chance_left = Out(
         float, "chance that an object of at least 15 mm is left; nan with a known number", result=left_in_words
     )

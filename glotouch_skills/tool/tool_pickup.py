@@ -45,15 +45,15 @@ SLOT_M_S = 0.02
 """Speed at which the ball enters the holder from below. A ball beside the middle of the slot snags on its edge and
 slips in; if it is faster, the robot's own stop takes that for a collision (`bench search --conditions harsh`, seed
 53657, e539f6ee)."""
+SLOT_M = 0.018
+"""Distance below the holder's lower edge from which the ball rises slowly. Source: ours; its radius, the height of the
+rails, which the holder's description leaves out, and a margin."""
 MAX_YIELDS = 4
-"""Number of rises, between which the hand gives way to the slot. Source: ours; each gives way by 1.5 mm or more."""
+"""Maximum number of rises. Between two of them the hand gives way to the slot. Source: ours."""
 GIVE_WAY_M_S = 0.01
 """Speed of giving way. Source: ours."""
 HORIZONTAL_B = np.array([1.0, 1.0, 0.0])
 """Selects the horizontal components in B."""
-SLOT_M = 0.018
-"""The ball may snag from this far below the holder's lower edge on. Source: ours; its radius, and the height of the
-rails, which the holder's description leaves out."""
 HANDLE_TOLERANCE_M = 0.004
 """The jaws hold the handle if the aperture is within this of its width: twice the largest bias, and compliance."""
 MIN_OPEN_M = 0.01

@@ -138,7 +138,7 @@ tree = st.recursive(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=400, deadline=None)
 @given(
     st.one_of(
         tree,

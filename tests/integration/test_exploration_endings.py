@@ -39,8 +39,7 @@ def test_an_empty_container_is_searched_and_said_to_be_empty(block: Path, tmp_pa
     )
 
 
-@pytest.mark.study
-@pytest.mark.parametrize("yaw", [0.0, 0.4])
+@pytest.mark.parametrize("yaw", [pytest.param(0.0, marks=pytest.mark.study), 0.4])
 def test_an_object_against_a_wall_is_found(block: Path, tmp_path: Path, yaw: float) -> None:
     """Two millimetres from the wall the ball cannot go round it; what can be touched says where it is."""
     reach = 0.5 * (BLOCK_M[0] * np.cos(yaw) + BLOCK_M[1] * np.sin(yaw))

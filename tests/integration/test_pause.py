@@ -193,7 +193,6 @@ def test_a_squeeze_is_held_for_twenty_seconds(run: Any, moment: str) -> None:
     assert referee.peak_force_N() < 30.0
 
 
-@pytest.mark.study
 def test_a_pick_paused_at_every_50th_tick_ends_with_the_same_object(run: Any, load: Any) -> None:
     """A mission of shipped skills, paused at different places in two runs."""
     held = []

@@ -299,7 +299,6 @@ def test_a_probe_that_slipped_in_the_jaws_is_put_back_and_taken_anew(run: Run) -
     assert done.referee.probe_in_holder()
 
 
-@pytest.mark.study
 def test_jaws_that_report_wrongly_do_not_end_a_search_with_a_held_probe(run: Run) -> None:
     faults = "  - {fault: grip_misreport, with: {aperture_m: 6 mm}, when: {node: guarded_sweep, after_s: 2}, for: ever}"
     done = run(EXPLORE.replace("EXPECTED", "1"), faults, {"block": (0.02, -0.06, 0.0)}, {"block": WIDE})
@@ -323,7 +322,6 @@ def knowing(candidate: Candidate) -> type[Skill]:
     return Known
 
 
-@pytest.mark.study
 def test_what_frozen_gels_did_not_feel_is_touched_again(run: Run, found: Any) -> None:
     """One image comes again and again while the only candidate is squeezed; then the jaws touch where it tells most."""
     tree = """

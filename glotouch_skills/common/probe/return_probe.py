@@ -152,9 +152,10 @@ def return_probe(
 
 
 def _aside_m(ball_B_m: Array) -> Array:
-    """Return the shift (3,) of the hand from over its seat that brings the ball over the middle of the slot.
+    """Return the shift (3,) of the hand that brings the ball over the middle of the slot; zero if it passes anyway.
 
-    Zero if the ball, beside the middle by `ball_B_m` (3,), passes anyway.
+    Args:
+        ball_B_m: (3,) offset of the ball from the middle with the hand over its seat.
     """
     off = float(np.linalg.norm(ball_B_m))
     return np.zeros(3) if off < CENTRED_M else -ball_B_m * min(1.0, MAX_ASIDE_M / off)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.bench.planar import ContactModel, planar_world
-from glotouch_bt.bench.planar.explore import explore, refine_all
+from glotouch_bt.bench.planar.explore import _again, explore, refine_all
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.perception.search import search_policy
 from glotouch_bt.robot.scene import load_folder
@@ -30,10 +30,14 @@ def test_two_cylinders_are_found_where_they_are(world_of: WorldOf, policy: str) 
     measured = np.array([t.candidate.contour.centre_K_m for t in refined])
     assert np.linalg.norm(measured[:, None] - centres_of(world)[None], axis=2).min(axis=0).max() < 0.002
     assert [t.travel_m for t in explored.found] == sorted(t.travel_m for t in explored.found)
-    again = [t for t in refined if t.earlier]
-    assert all(
-        t.earlier[-1].travel_m < t.travel_m and t.earlier[-1].candidate.index == t.candidate.index for t in again
-    )
+
+
+def test_a_candidate_that_is_traced_again_keeps_its_earlier_traces(world_of: WorldOf) -> None:
+    explored = explore(world_of([cylinder(0.025)], [(0.05, 0.06, 0)]), search_policy("nearest_frontier"), 1)
+    candidate = explored.found[0].candidate
+    first = _again(None, 1.0, candidate)
+    third = _again(_again(first, 2.0, candidate), 3.0, candidate)
+    assert [t.travel_m for t in (*third.earlier, third)] == [1.0, 2.0, 3.0]
 
 
 def test_an_empty_container_is_exhausted(world_of: WorldOf) -> None:

@@ -319,7 +319,7 @@ def by_sets(spec: NodeSpec) -> tuple[DataFlow, set[tuple[str, str, str]], set[tu
     return flow, wrong, ends
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
 @given(tree=TREES)
 @example(tree={"fail": {"do": {"selector": [{"timeout": {"seconds": 1.0, "do": "a"}}, "a"]}}})
 def test_what_is_found_is_what_can_happen(tree: Any) -> None:
@@ -336,7 +336,7 @@ def test_what_is_found_is_what_can_happen(tree: Any) -> None:
         assert possible == ends
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
 @given(tree=TREES)
 def test_the_path_shown_is_the_shortest_there_is(tree: Any) -> None:
     """It ends at the node that looks, after as few outcomes of leaves as any run that was ticked."""
@@ -358,7 +358,7 @@ def test_the_path_shown_is_the_shortest_there_is(tree: Any) -> None:
                 assert len(path) - 1 == seen[requirement.node.name, requirement.port, state], path
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
 @given(tree=TREES)
 def test_variables_that_decide_nothing_need_not_be_followed(tree: Any) -> None:
     """The same nodes are entered and end alike, and a tree has findings with all variables only if it has some here."""

@@ -162,4 +162,5 @@ def test_free_space_beside_an_object_is_kept_until_closures_have_moved_it(
     b, skill = make()
     b.arm.felt.add(felt_K_m)
     b.run(skill)
+    assert skill.status is (Status.SUCCESS if stable else Status.FAILURE), skill.feedback_message
     assert np.isfinite(b.arm.felt.free_down_to(felt_K_m[:, :2], 0.001)) is np.bool_(kept)
