@@ -109,17 +109,17 @@ MEASURES: dict[str, tuple[Callable[[], None], ...]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class AblationCampaign(RetrieveCampaign):
-    """Missions without one measure.
+    """Missions with one way of saving time switched off.
 
     Attributes:
-        without: Name of the measure.
+        without: What is switched off, a key of `MEASURES`.
     """
 
     without: str
 
     @property
     def identity(self) -> dict[str, Any]:
-        """See `Campaign`; a folder holds the missions without one measure."""
+        """See `Campaign`; a folder holds the missions without one of them."""
         return {**super().identity, "without": self.without}
 
     def _trial(self, target: str, seed: int) -> Trial:
@@ -135,7 +135,7 @@ class AblationCampaign(RetrieveCampaign):
 
 @cache
 def switch_off(measure: str) -> None:
-    """Switch off a measure in this process."""
+    """Switch off one way of saving time in this process."""
     load_mission("retrieve", {})
     load_all()
     for change in MEASURES[measure]:
@@ -143,7 +143,7 @@ def switch_off(measure: str) -> None:
 
 
 def run_without(measure: str, head: Row, request: RunRequest) -> Row:
-    """Run a trial without a measure; its row has the touches, too."""
+    """Run a trial without one of them; its row has the touches, too."""
     switch_off(measure)
     row = run_trial(head, request)
     assert request.out is not None
@@ -168,10 +168,10 @@ def touches(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
-    """Return quantities by measure; differences are those to the missions with all measures.
+    """Return quantities by what is switched off; differences are those to the missions as shipped.
 
     Args:
-        rows: Rows of each measure, in the same order of worlds; "none" among them.
+        rows: Rows by what is switched off, in the same order of worlds; "none": as shipped.
     """
     found: dict[str, Any] = {}
 
@@ -198,7 +198,7 @@ def summarise(rows: dict[str, list[Row]]) -> dict[str, Any]:
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Run the missions without each measure, and write summary.json."""
+    """Run the missions as shipped and without each of them, and write summary.json."""
     given = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     given.add_argument("--trials", type=int, default=30)
     given.add_argument("--seed", type=int, required=True)
@@ -226,7 +226,7 @@ def main(words: Sequence[str] | None = None) -> None:
         def write(done: Sequence[Row], out: Path = campaign.out) -> None:
             write_table(out, "trials.csv", COLUMNS, done)
 
-        with WorkerPool(asked.workers) as pool:  # its processes have only this measure switched off
+        with WorkerPool(asked.workers) as pool:  # only this one is switched off in its processes
             rows[measure] = run_trials(pool, campaign.trials(), campaign, told, write=write)
     write_summary(asked.out, summarise(rows) | {"seeds": [*range(asked.seed, asked.seed + asked.trials)]})
 
