@@ -25,6 +25,7 @@ OPTIONS = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
+    "--disable-back-forward-cache",  # a page kept there stays connected, and `glotouch run --live` waits for it
 )
 PATIENCE_S = 60.0
 DESKTOP, PHONE = (1100, 640), (390, 844)
