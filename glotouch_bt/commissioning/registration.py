@@ -151,7 +151,7 @@ def _lower(arm: Arm, world: World, observe: Callable[[], Observation], pose_B_P:
     yield from arm.transit(above, height, TRAVEL_M_S)
     yield from arm.hold(SETTLE_S)
     down_B = np.array([0.0, 0.0, -1.0])
-    guard = TouchGuard(observe(), arm.pose_B_P.rotation.T @ down_B)
+    guard = TouchGuard(observe(), arm.rotation_B_S.T @ down_B)
     result = yield from arm.line(pose_B_P, LOWER_M_S, guard=guard, check=False)
     if result.stop is not None:
         yield from arm.line(above, TRAVEL_M_S, check=False)
@@ -176,7 +176,7 @@ def _touch_wall(
     if blocked is not None:
         return blocked
     into_B = container.pose_B_K.rotation @ normal
-    guard = TouchGuard(observe(), arm.pose_B_P.rotation.T @ into_B)
+    guard = TouchGuard(observe(), arm.rotation_B_S.T @ into_B)
     result = yield from arm.shift((CLEAR_M + MAX_BEYOND_M) * into_B, APPROACH_M_S, guard=guard, check=False)
     place = container.pose_B_K.inverse().apply(result.path_B_m[-1])
     yield from arm.shift(-CLEAR_M * into_B, TRAVEL_M_S, check=False)
@@ -196,7 +196,7 @@ def _touch_floor(arm: Arm, world: World, observe: Callable[[], Observation]) -> 
     if blocked is not None:
         return blocked
     down_B = np.array([0.0, 0.0, -1.0])
-    guard = TouchGuard(observe(), arm.pose_B_P.rotation.T @ down_B)
+    guard = TouchGuard(observe(), arm.rotation_B_S.T @ down_B)
     result = yield from arm.shift((CLEAR_M + MAX_BEYOND_M) * down_B, APPROACH_M_S, guard=guard, check=False)
     lowest = float(result.path_B_m[-1][2]) - below - float(world.container.pose_B_K.position_m[2])
     yield from arm.shift(-CLEAR_M * down_B, TRAVEL_M_S, check=False)

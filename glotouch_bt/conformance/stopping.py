@@ -123,6 +123,14 @@ class StoppingTests(Conformance):
         rig = self.rig()
         self._stops(rig, self._moving(rig))
 
+    def test_goes_on_after_a_stop_at_full_speed(self) -> None:
+        """The next motion may begin where the arm came to rest, beyond its last setpoint."""
+        rig = self.rig()
+        self._moving(rig, rig.robot.limits.tcp_speed_m_s)
+        at = rig.rest(0.5).pose_B_P.position_m
+        rig.shift(np.array([0.0, -0.03, 0.0]))
+        assert at[1] - rig.rest(0.2).position_B_P[-1][1] > 0.025
+
     def test_stops_on_hold(self) -> None:
         """`hold` may be called several times."""
         rig = self.rig()

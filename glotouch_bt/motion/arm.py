@@ -91,6 +91,7 @@ class Arm(Mover):
 
     Attributes:
         kinematics: Forward and inverse kinematics.
+        rotation_P_S: (3, 3) axes of the force sensor, written in P.
         scene: Obstacles; skills add the objects they find.
         felt: Space that the held tool has felt to be free.
         tool_seat: Displacement of the held tool since it was first measured.
@@ -101,6 +102,7 @@ class Arm(Mover):
     def __init__(self, description: RobotDescription, limits: Limits, world: World, period_s: float) -> None:
         super().__init__(description, limits, period_s)
         self.world = world
+        self.rotation_P_S: Array = description.gripper.pose_E_P.rotation.T  # the axes of S are those of E
         self.scene = Scene(self.kinematics, world)
         self.felt = FeltSpace()
         self.tool_seat = ToolSeat()
@@ -125,6 +127,11 @@ class Arm(Mover):
         self.scene.restore(state["scene"])
         self.felt.restore(state["felt"])
         self.tool_seat.restore(state["tool_seat"])
+
+    @property
+    def rotation_B_S(self) -> Array:
+        """Present axes (3, 3) of the force sensor, written in B."""
+        return np.asarray(self.pose_B_P.rotation @ self.rotation_P_S)
 
     # -- motions -----------------------------------------------------------------------------------------------------
 

@@ -52,6 +52,7 @@ class NextProbe(Skill):
 
     known = In(tuple, "all candidates", key="candidates", element=Candidate, required=False)
     measured = In(Candidate, "the candidate measured last", key="candidate", required=False)
+    chosen = In(str, "what was measured last; nothing yet", key="next_part", required=False)
     felt = In(tuple, "closures so far", element=TouchSet, required=False, expected=False)
     before = In(tuple, "measurements tried so far", key="probed", element=ProbeTouch, required=False)
     candidates = Out(tuple, "all candidates, with what was measured last", element=Candidate)
@@ -67,7 +68,7 @@ class NextProbe(Skill):
         if not self.known:
             raise self.NO_CANDIDATES("there is no candidate to measure")
         yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
-        new, before = self.measured, self.before or ()
+        new, before = self.measured if self.chosen else None, self.before or ()
         candidates = tuple(new if new is not None and new.index == c.index else c for c in self.known)
         model = self._target()
         candidates = self._distinct(candidates, model)

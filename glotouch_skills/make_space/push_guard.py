@@ -104,7 +104,7 @@ class PushGuard:
 
     def __call__(self, seen: Observation) -> str | None:
         """See `motion.Guard`."""
-        force_B = self.arm.pose_B_P.rotation @ seen.wrench_S[:, :3].mean(axis=0)
+        force_B = self.arm.rotation_B_S @ seen.wrench_S[:, :3].mean(axis=0)
         change_B = force_B - self.free_B_N
         self.resistance_N.append(-float(change_B @ self.along_B))
         self.lift_N.append(float(change_B @ UP_B))
@@ -173,4 +173,4 @@ def standing_force_B_N(arm: Arm) -> Motion[Array]:
     """Come to rest and return the mean force (3,) on the hand, written in B."""
     yield from arm.hold(STAND_S)
     blocks = yield from arm.hold(STAND_S)
-    return np.asarray(arm.pose_B_P.rotation @ np.concatenate([b.wrench_S[:, :3] for b in blocks]).mean(axis=0))
+    return np.asarray(arm.rotation_B_S @ np.concatenate([b.wrench_S[:, :3] for b in blocks]).mean(axis=0))

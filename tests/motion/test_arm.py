@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -252,3 +254,13 @@ def test_motions_are_reproducible_to_the_bit(world: World, drive) -> None:  # ty
         drive(robot, arm.shift((0.05, 0.05, 0), 0.1))
         records.append(np.stack([c.motion.q for c in robot.commands if c.motion]).tobytes())
     assert records[0] == records[1]
+
+
+def test_the_axes_of_a_sensor_that_is_turned_against_the_jaws(world: World) -> None:
+    """Closed form: E = P turned back about z."""
+    gripper = FAKE_ARM.gripper
+    turned = dataclasses.replace(gripper, pose_E_P=gripper.pose_E_P @ Pose.planar((0.0, 0.0, 0.0), np.pi / 6))
+    arm = Arm(dataclasses.replace(FAKE_ARM, gripper=turned), Limits(), world, DT)
+    pose_B_E = arm.pose_B_P @ turned.pose_E_P.inverse()
+    assert np.allclose(arm.rotation_B_S, pose_B_E.rotation)
+    assert np.allclose(arm.rotation_P_S @ [0.0, 1.0, 0.0], [0.5, np.sqrt(0.75), 0.0])

@@ -181,11 +181,11 @@ class DriverLink:
         return BackendError(why)
 
     def _receive(self, timeout_s: float) -> messages.Answer | None:
-        if not self._socket.poll(round(timeout_s * 1e3)):
-            return None
         try:
+            if not self._socket.poll(round(timeout_s * 1e3)):
+                return None
             answer: messages.Answer = messages.decode_answer(self._socket.recv(zmq.NOBLOCK))
-        except messages.BadMessage as e:
+        except (messages.BadMessage, zmq.ZMQError) as e:
             raise self._lose(f"the driver's answer cannot be read: {e}") from e
         return answer
 

@@ -118,8 +118,8 @@ class FlexivXenseRobot(Robot):
 
     def hold(self) -> None:
         """See `Robot`."""
-        if self._closed or self._failed is not None:
-            return  # the driver holds by itself on a fault and without messages
+        if self._closed:
+            return
         try:
             self.link.ask(messages.HoldRequest(number=self.link.number()), messages.Accepted, limit_s=QUIT_S)
         except GlotouchError as e:

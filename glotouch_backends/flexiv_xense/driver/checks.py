@@ -12,8 +12,13 @@ STEP_SLACK = 1.02
 """Implied over allowed joint velocity between two setpoints, for rounding. Source: ours."""
 SPEED_SLACK = 1.1
 """Commanded over allowed speed of P. Source: ours, rounding and the end of a profile."""
+MAX_TURN_RAD_S = 4.0
+"""Largest angular speed of P, also of the arm's own smoothing. Source: ours; planned rotations have at most 2.5
+rad/s."""
 MAX_START_OFFSET_M = 5e-3
 """Largest distance of the first setpoint from the resting arm (servo error). Source: ours."""
+MAX_START_TURN_RAD = 0.05
+"""The same for the angle."""
 MAX_NORM_ERROR = 1e-3
 """Tolerated error of a quaternion's norm. Source: ours."""
 
@@ -29,12 +34,12 @@ class SetpointCheck:
     def __init__(self, limits: ArmLimits, period_s: float) -> None:
         self._limits, self._period = limits, period_s
         self._q: Sequence[float] = ()
-        self._position: Sequence[float] = ()
+        self._pose: Sequence[float] = ()
         self._fresh = True
 
     def reset_to(self, q: Sequence[float], pose: Sequence[float]) -> None:
         """Start again from the arm at rest at joints (7,) and TCP pose (7,)."""
-        self._q, self._position, self._fresh = tuple(q), tuple(pose[:3]), True
+        self._q, self._pose, self._fresh = tuple(q), tuple(pose), True
 
     def check(self, s: Setpoint) -> None:
         """Check a setpoint; if it is valid it becomes the last one.
@@ -49,7 +54,7 @@ class SetpointCheck:
         norm = math.sqrt(sum(v * v for v in s.pose[3:]))
         if abs(norm - 1.0) > MAX_NORM_ERROR:
             raise CommandRefused("setpoint.pose", list(s.pose[3:]), "a unit quaternion (w x y z)")
-        reach = MAX_START_OFFSET_M if self._fresh else 0.0
+        reach, turn = (MAX_START_OFFSET_M, MAX_START_TURN_RAD) if self._fresh else (0.0, 0.0)
         for i in range(7):
             q, dq, top = s.q[i], s.dq[i], limits.dq_max[i]
             low, high = limits.q_min[i] - 1e-9, limits.q_max[i] + 1e-9
@@ -61,14 +66,25 @@ class SetpointCheck:
             # After a stop the arm's own controller may have moved the joints within the null space.
             if abs(step) > STEP_SLACK * top and not self._fresh:
                 raise CommandRefused(f"setpoint.(q - last q)/period[joint{i + 1}]", step, f"within {top:.4f} rad/s")
-        moved = math.dist(s.pose[:3], self._position)
+        moved = math.dist(s.pose[:3], self._pose[:3])
         allowed = SPEED_SLACK * limits.speed_m_s * self._period + reach
         if moved > allowed:
             raise CommandRefused("setpoint.pose", f"{moved * 1e3:.2f} mm from the last", f"<= {allowed * 1e3:.2f} mm")
-        speed = math.sqrt(sum(v * v for v in s.twist[:3]))
+        turned, allowed = _angle_rad(s.pose[3:], self._pose[3:]), SPEED_SLACK * MAX_TURN_RAD_S * self._period + turn
+        if turned > allowed:
+            raise CommandRefused("setpoint.pose", f"{turned:.4f} rad from the last", f"<= {allowed:.4f} rad")
+        speed, turning = (math.sqrt(sum(v * v for v in part)) for part in (s.twist[:3], s.twist[3:]))
         if speed > SPEED_SLACK * limits.speed_m_s:
             raise CommandRefused("setpoint.twist", f"{speed:.3f} m/s", f"<= {limits.speed_m_s:g} m/s")
-        self._q, self._position, self._fresh = s.q, s.pose[:3], False
+        if turning > SPEED_SLACK * MAX_TURN_RAD_S:
+            raise CommandRefused("setpoint.twist", f"{turning:.3f} rad/s", f"<= {MAX_TURN_RAD_S:g} rad/s")
+        self._q, self._pose, self._fresh = s.q, s.pose, False
+
+
+def _angle_rad(a: Sequence[float], b: Sequence[float]) -> float:
+    """Return the angle between two rotations given as quaternions."""
+    norm = math.hypot(*a) * math.hypot(*b)
+    return 2.0 * math.acos(min(1.0, abs(sum(x * y for x, y in zip(a, b, strict=True))) / norm))
 
 
 def rest_pose(setpoint: Setpoint, acceleration_m_s2: float) -> tuple[float, ...]:

@@ -4,6 +4,7 @@ The paced loop reads the arm every millisecond and sends a block on a fixed grid
 late command:
 
     no command for HOLD_AFTER_S            the arm brakes to rest along its path
+    a device failed                        the same, repeated until the arm accepts it
     no message for CLIENT_LOST_S           Stop(), IDLE, devices released, the process ends
 """
 
@@ -18,7 +19,7 @@ from contextlib import nullcontext, suppress
 from . import messages
 from .endpoint import DriverSocket
 from .faults import CommandRefused, DeviceFault, vendor_call
-from .session import DriverSession
+from .session import MAX_STANDSTILL_M_S, DriverSession
 
 SAMPLE_S = 0.001
 """Interval between two readings of the arm."""
@@ -30,8 +31,6 @@ BEAT_S = 0.05
 """Interval between two heartbeats of the driver."""
 LOCKSTEP_CLIENT_LOST_S = 10.0
 """The same in lock-step, where the client may compute for long. Source: ours."""
-MAX_STANDSTILL_M_S = 1e-3
-"""The tool stands still below this speed. Source: ours."""
 MAX_BEHIND_S = 0.02
 """A loop that is later than this skips samples instead of catching up; the stamps show the gap. Source: ours."""
 
@@ -138,25 +137,37 @@ class Lockstep(_DriverLoop):
                         self._log("fault", kind=session.failed.kind, message=session.failed.message)
 
 
-class _CommandTimeout:
-    """Hold and log when no command has arrived for a while."""
+class _Stop:
+    """Hold the arm once no command has arrived for a while or a device has failed, until the arm accepts it."""
 
     def __init__(self, session: DriverSession, log: Log) -> None:
         self._session, self._log = session, log
-        self._silent = self._still = False
+        self._silent = self._still = self._held = False
 
     def check(self, silent_s: float) -> None:
-        """Check once a sample; `silent_s` is the time since the last command."""
+        """Check before each sample; `silent_s` is the time since the last command.
+
+        Raises:
+            DeviceFault: The arm did not accept the hold, and no device had failed before. The next call tries again.
+        """
         session = self._session
-        if silent_s <= HOLD_AFTER_S:
-            self._silent = False
-            return
-        if not self._silent:
-            self._silent, self._still = True, False
+        silent = silent_s > HOLD_AFTER_S
+        if silent and not self._silent:
+            self._still = False
             session.recent_peak_N = 0.0
             self._log("no command", silent_s=silent_s, speed_m_s=session.speed_m_s)
-            session.hold()
-        if not self._still and session.speed_m_s < MAX_STANDSTILL_M_S:
+        self._silent = silent
+        if not silent and session.failed is None:
+            self._held = False
+        elif not self._held:
+            try:
+                session.hold()
+            except DeviceFault:
+                if session.failed is None:
+                    raise
+            else:
+                self._held = True
+        if silent and not self._still and session.speed_m_s < MAX_STANDSTILL_M_S:
             self._still = True
             self._log("standstill", silent_s=silent_s, peak_force_N=session.recent_peak_N)
 
@@ -175,7 +186,7 @@ class Paced(_DriverLoop):
         begin = due = clock.now_s()
         heard = commanded = beaten = begin
         late = tick = 0
-        timeout = _CommandTimeout(session, self._log)
+        stop = _Stop(session, self._log)
         while not self._stopping():
             due += SAMPLE_S
             now = clock.now_s()
@@ -196,9 +207,9 @@ class Paced(_DriverLoop):
                     if left <= 0.0:
                         break
                     socket.wait(left)
+                stop.check(clock.now_s() - commanded)
                 session.sample()
                 now = clock.now_s()
-                timeout.check(now - commanded)
                 if tick % steps == 0:
                     session.poll()
                     if waiting is None:

@@ -38,6 +38,13 @@ Force = Annotated[float, msgspec.Meta(gt=0.0, le=200.0)]
 Torque = Annotated[float, msgspec.Meta(gt=0.0, le=50.0)]
 Length = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
 Seconds = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
+Mass = Annotated[float, msgspec.Meta(ge=0.0, le=50.0)]
+Coordinate = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
+Point = Annotated[tuple[Coordinate, ...], msgspec.Meta(min_length=3, max_length=3)]
+Angle = Annotated[float, msgspec.Meta(ge=-12.6, le=12.6)]
+Angles = Annotated[tuple[Angle, ...], msgspec.Meta(min_length=7, max_length=7)]
+JointSpeed = Annotated[float, msgspec.Meta(gt=0.0, le=10.0)]
+JointSpeeds = Annotated[tuple[JointSpeed, ...], msgspec.Meta(min_length=7, max_length=7)]
 
 
 class ToolData(msgspec.Struct, frozen=True, kw_only=True):
@@ -48,8 +55,8 @@ class ToolData(msgspec.Struct, frozen=True, kw_only=True):
         pose_E_P: (7,) P, the arm's TCP, in the flange frame: x y z qw qx qy qz.
     """
 
-    mass_kg: Annotated[float, msgspec.Meta(ge=0.0, le=50.0)]
-    com_E_m: Three
+    mass_kg: Mass
+    com_E_m: Point
     pose_E_P: Seven
 
 
@@ -63,9 +70,9 @@ class ArmLimits(msgspec.Struct, frozen=True, kw_only=True):
         max_age_s: Largest age of a reading.
     """
 
-    q_min: Seven
-    q_max: Seven
-    dq_max: Seven
+    q_min: Angles
+    q_max: Angles
+    dq_max: JointSpeeds
     speed_m_s: Speed
     acceleration_m_s2: Acceleration
     stop_acceleration_m_s2: Acceleration
@@ -193,8 +200,8 @@ class PayloadRequest(_Numbered, frozen=True, kw_only=True):
     """Set the payload, with its centre of mass (3,) in P. Answered like a tare."""
 
     ticket: int
-    mass_kg: float
-    com_P_m: Three
+    mass_kg: Mass
+    com_P_m: Point
 
 
 class HoldRequest(_Numbered, frozen=True):

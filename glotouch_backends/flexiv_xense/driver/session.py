@@ -21,6 +21,8 @@ MAX_BUFFERED_SAMPLES = 60_000
 """Samples buffered while the client requests none (60 s)."""
 SPEED_SAMPLES = 20
 """Samples over which the speed of P is measured."""
+MAX_STANDSTILL_M_S = 1e-3
+"""P stands still below this speed. Source: ours."""
 TWIST_SAMPLES = 5
 """Samples over which the twist of a pressing hand is measured; it must be known within milliseconds."""
 NO_TWIST = (0.0,) * 6
@@ -122,6 +124,8 @@ class DriverSession:
         if cycle.setpoint is not None:
             if self._busy:
                 raise CommandRefused("command.motion", "a setpoint", "none while a tare or payload is pending")
+            if self._rest is not None and self._newest is not None and self.speed_m_s < MAX_STANDSTILL_M_S:
+                self._check.reset_to(self._newest[:7], self._newest[14:21])  # it has braked past its last setpoint
             self._check.check(cycle.setpoint)
 
     def hold(self) -> None:
@@ -137,7 +141,10 @@ class DriverSession:
         self._arm.hold_at(self._rest)
 
     def start(self, request: messages.TareRequest | messages.PayloadRequest) -> None:
-        """Queue a slow request; it starts at once if none is pending."""
+        """Queue a slow request; it starts at once if none is pending. A read-only session refuses it."""
+        if not self._moves:
+            self._done.append(messages.Done(request.ticket, "not in a read-only session: it would switch the arm"))
+            return
         self._queue.append(request)
         if not self._busy:
             self._busy = True

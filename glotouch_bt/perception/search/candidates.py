@@ -123,7 +123,9 @@ def admit(
         )
     if better is None:
         outline = traced.outline
-        better = Candidate(_next_index(known), outline.contour, height_m, quality(outline), traced.contacts, False)
+        better = Candidate(
+            _next_index(belief, known), outline.contour, height_m, quality(outline), traced.contacts, False
+        )
     parts = bodies(better.contacts, radius, belief.path_K_m)
     if len(parts) == 1 and max(better.contour.size_m) > MAX_LENGTH_M:
         # Only one object can be here: keep the newest contacts; some of the earlier ones were another object's.
@@ -131,7 +133,7 @@ def admit(
     every = {c.index: c for c in known} | {better.index: better}
     changed: list[int] = []
     for body in parts:
-        index = _next_index(every.values()) if changed else better.index
+        index = _next_index(belief, every.values()) if changed else better.index
         outline = outline_of(body, radius)
         every[index] = replace(better, index=index)
         if len(parts) > 1:
@@ -166,7 +168,7 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
         parts = (split_at_motion(parts[0], radius, likely=len(one.contacts))[1],)
     mine = {id(c) for c in one.contacts}
     parts = tuple(sorted(parts, key=lambda body: -sum(id(c) in mine for c in body)))
-    for index, body in zip(chain((whole, part), count(_next_index(admitted.candidates))), parts, strict=False):
+    for index, body in zip(chain((whole, part), count(_next_index(belief, admitted.candidates))), parts, strict=False):
         every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius))
         belief = belief.with_exclusion(_occupied(every[index]), exclusion_m, index)
         changed = tuple(dict.fromkeys((*changed, index)))
@@ -188,8 +190,10 @@ def _occupied(candidate: Candidate) -> Contour:
     return Contour("box", middle, (size[0], size[1]), yaw, 0.0, np.zeros(0), family="free", boundary_K_m=hull)
 
 
-def _next_index(candidates: Iterable[Candidate]) -> int:
-    return max((c.index for c in candidates), default=-1) + 1
+def _next_index(belief: SearchMap, candidates: Iterable[Candidate]) -> int:
+    """Return an index that no candidate has, and no traced object whose candidate was left out."""
+    traced = (e.index for e in belief.exclusions if e.index is not None)
+    return max(chain((c.index for c in candidates), traced), default=-1) + 1
 
 
 def _admitted(

@@ -234,14 +234,17 @@ class SearchMap:
     @cached_property
     def hidden(self) -> Remaining:
         """Where objects may still be."""
-        traced = [e.contour for e in self.exclusions]
-        return remaining(self.half, self.prior, traced, self.path_distance, self.dropped)
+        return self._remaining(self.prior)
 
     @cached_property
     def anywhere(self) -> Remaining:
         """Where objects of the usual sizes may still be, without a gap to walls and traced objects."""
-        traced = [e.contour for e in self.exclusions]
-        return remaining(self.half, CROWDED, traced, self.path_distance, self.dropped)
+        return self._remaining(CROWDED)
+
+    def _remaining(self, prior: DiscPrior) -> Remaining:
+        """Return where objects may still be: an obstacle hides none, because it is only a place of a contact."""
+        traced = [e.contour for e in self.exclusions if e.traced]
+        return remaining(self.half, prior, traced, self.path_distance, self.dropped)
 
     @cached_property
     def chance_left(self) -> float:

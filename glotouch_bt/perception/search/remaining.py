@@ -62,8 +62,9 @@ USUAL = DiscPrior()
 """Objects 4-11 cm long, 30 mm apart: where the known number of objects is probably found first."""
 CROWDED = DiscPrior(gap_m=0.0, gap_weight=1.0)
 """Objects of the same sizes, also close to a wall or to another object."""
-ANY = DiscPrior(radii_m=(0.0075, 0.011, 0.0165, 0.025, 0.037), grid_m=0.005, gap_m=0.0, gap_weight=1.0)
-"""Any object of at least 15 mm, log-uniform in size, also close to a wall or to another object."""
+ANY = DiscPrior(radii_m=(0.0088, 0.0121, 0.0167, 0.0229, 0.0315), grid_m=0.005, gap_m=0.0, gap_weight=1.0, touch=1.0)
+"""Any object of 15 to 74 mm, log-uniform in size, also close to a wall or to another object. Each radius is the middle
+of a fifth of the sizes."""
 
 
 @dataclass(frozen=True)

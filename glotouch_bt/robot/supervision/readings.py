@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from glotouch_bt.compiled import compiled
 from glotouch_bt.robot.command import Command
 from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.interface import Robot
@@ -19,11 +18,16 @@ from glotouch_bt.robot.observation import SAMPLED, Observation
 from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits, TransientCounter
 from glotouch_bt.robot.supervision.response import WristResponseGuard
 from glotouch_bt.robot.supervision.signals import TactileSignalGuard, WrenchSignalGuard
+from glotouch_bt.robot.supervision.targets import (
+    MAX_NORM_ERROR,
+    NOWHERE,
+    angle_rad,
+    distance_to_path,
+    way_to_target,
+)
 
 MAX_REST_SPEED_RAD_S = 0.01
 """A joint below this speed stands still. Source: ours."""
-MAX_NORM_ERROR = 0.01
-"""Tolerated error of a quaternion's squared norm. Source: ours."""
 LATE_PERIODS = 0.5
 """A cycle is late when it lasts this many periods more than one. Source: ours."""
 MAX_LAG_M = 0.001
@@ -31,60 +35,6 @@ MAX_LAG_M = 0.001
 MIN_SAMPLE_SHARE = 0.25
 """A block with fewer than this share of its samples is reported. Source: measured; a device that is polled every
 millisecond by a soft real-time loop gives 0.7-0.9 of them, on a loaded machine 0.5."""
-
-
-NOWHERE: Array = np.zeros(0)
-"""A target that is not known."""
-
-
-@compiled(
-    "given f8[:, :]",
-    "given f8[:, :]",
-    "given f8[:, :]",
-    "given f8[:, :]",
-    "given f8[:, :]",
-    "given f8[:, :]",
-    "given f8[:]",
-    "f8",
-)
-def way_to_target(
-    q: Array, dq: Array, position: Array, quat: Array, wrench: Array, limits: Array, target: Array, min_dot: float
-) -> float:
-    """Return the distance of the hand's newest position from its target, or -1 if any reading is out of its range.
-
-    Args:
-        q, dq, position, quat, wrench: The samples of an `Observation`.
-        limits: (4, dof) least and greatest angle, greatest speed; and reach, stop force, stop torque.
-        target: (7,) position and quaternion of P in B, or `NOWHERE`.
-        min_dot: Least inner product of the newest quaternion with that of the target.
-    """
-    n, dof = q.shape
-    reach, stop_N, stop_Nm = limits[3, 0], limits[3, 1], limits[3, 2]
-    for i in range(n):
-        force_2 = torque_2 = norm_2 = 0.0
-        for j in range(dof):
-            if not (math.isfinite(q[i, j]) and abs(dq[i, j]) <= limits[2, j]):
-                return -1.0
-        for j in range(3):
-            if not abs(position[i, j]) <= reach:
-                return -1.0
-            force_2 += wrench[i, j] ** 2
-            torque_2 += wrench[i, j + 3] ** 2
-        for j in range(4):
-            norm_2 += quat[i, j] ** 2
-        if not (force_2 < stop_N**2 and torque_2 < stop_Nm**2 and abs(norm_2 - 1.0) <= MAX_NORM_ERROR):
-            return -1.0
-    for j in range(dof):
-        if not limits[0, j] <= q[n - 1, j] <= limits[1, j]:
-            return -1.0
-    if len(target) == 0:
-        return 0.0
-    dot = away_2 = 0.0
-    for j in range(3):
-        away_2 += (position[n - 1, j] - target[j]) ** 2
-    for j in range(4):
-        dot += quat[n - 1, j] * target[3 + j]
-    return math.sqrt(away_2) if abs(dot) >= min_dot else -1.0
 
 
 class ReadingsGuard:
@@ -112,9 +62,9 @@ class ReadingsGuard:
             self._fast_limits[:3, i] = j.lower_rad - slack, j.upper_rad + slack, speed
         self._fast_limits[3, :3] = rules.reach_m, limits.stop_force_N, limits.stop_torque_Nm
         self._min_dot, self._min_pressing_force_2 = math.cos(0.5 * rules.following_rad), rules.touching_N**2
-        # Recently commanded positions and quaternions of P in B, newest last; empty while the arm brakes to an unknown
-        # place.
+        # Recently commanded positions and quaternions of P in B, newest last; empty while the arm brakes on its own.
         self._targets: deque[Array] = deque(maxlen=max(1, round(rules.lag_s / period_s)))
+        self._braking_from: tuple[list[float], float] | None = None  # position, largest distance from it
         self._has_velocity = False
         self._moving = False
         self._was_moving = False  # by the command before the newest: a late cycle waited with that one
@@ -132,6 +82,7 @@ class ReadingsGuard:
             self._response.reset()
         self._pads.reset()
         self._targets.clear()
+        self._braking_from = None
         self._moving = self._has_velocity = self._was_moving = False
         self._samples_over = 0
 
@@ -142,14 +93,35 @@ class ReadingsGuard:
         if motion is not None:
             pose = motion.pose_B_P
             self._targets.append(np.concatenate((pose.position_m, pose.quat)))
+            self._braking_from = None
             self._moving, self._has_velocity = True, bool(np.count_nonzero(motion.dq))
         elif self._moving and self._has_velocity:
+            self._braking_from = self._targets[-1][:3].tolist(), self._braking_m()
             self._targets.clear()
             self._moving = False
         elif self._targets:
             self._targets.append(self._targets[-1])
             self._moving = False
         self._pads.on_command(command.tactile, self._last_s)
+
+    def _braking_m(self) -> float:
+        """Return the largest distance from the newest target at which the arm may come to rest."""
+        path = [t[:3].tolist() for t in self._targets]
+        speed_m_s = max((math.dist(a, b) for a, b in pairwise(path)), default=0.0) / self._period_s
+        braking_m = 0.5 * speed_m_s**2 / self._limits.stop_acceleration_m_s2
+        return braking_m + speed_m_s * self._rules.lag_s + self._rules.following_m
+
+    def _add_stop(self) -> None:
+        """Insert the place where the device came to rest when the newest command was late.
+
+        Between two commands the arm may be anywhere on its way there.
+        """
+        if len(self._targets) > 2:
+            before, last, newest = (self._targets[i] for i in (-3, -2, -1))
+            step_m = last[:3] - before[:3]
+            ahead = 0.5 * float(np.linalg.norm(step_m)) / (self._period_s**2 * self._limits.stop_acceleration_m_s2)
+            self._targets[-1] = np.concatenate((last[:3] + ahead * step_m, last[3:]))
+            self._targets.append(newest)
 
     def check(self, o: Observation) -> tuple[Observation, list[GuardFinding]]:
         """Return the block without its unusable samples, and the findings, gravest last.
@@ -192,11 +164,16 @@ class ReadingsGuard:
         )
         if not 0.0 <= away_m <= MAX_LAG_M:
             return False
+        if self._braking_from is not None:
+            start, max_m = self._braking_from
+            if math.dist(o.position_B_P[-1].tolist(), start) > max_m:
+                return False
         self._samples_over = 0
         if self._targets:
             self._away_m = away_m
         elif not self._moving and np.abs(o.dq[-1]).max() < MAX_REST_SPEED_RAD_S:
             self._targets.append(np.concatenate((o.position_B_P[-1], o.quat_B_P[-1])))
+            self._braking_from = None
         return True
 
     def _pressing(self, o: Observation) -> bool:
@@ -290,30 +267,40 @@ class ReadingsGuard:
 
         The joints are not compared: a device that is sent poses chooses its own posture for them.
         """
+        rules, p, q, now_s = self._rules, o.position_B_P[-1].tolist(), o.quat_B_P[-1].tolist(), float(o.stamp_s[-1])
+        if self._braking_from is not None:
+            start, max_m = self._braking_from
+            if (away_m := math.dist(p, start)) > max_m:
+                what = f"the hand is {away_m * 1e3:.1f} mm from where it was told to stop"
+                what += f"; {max_m * 1e3:.1f} mm are allowed"
+                findings.append(GuardFinding("following", what, away_m, max_m, now_s))
         if not self._targets:
             return
-        rules, p, q = self._rules, o.position_B_P[-1].tolist(), o.quat_B_P[-1].tolist()
+        periods = max(1.0, (now_s - self._last_s) / self._period_s)
+        if self._was_moving and periods > 1.0 + rules.held_periods:
+            self._add_stop()
         targets = [t.tolist() for t in self._targets]
         away_m, before_m = distance_to_path(p, [t[:3] for t in targets]), self._away_m
         self._away_m = away_m
         touches = self._pressing(o)
         max_m = min(rules.touching_m, rules.following_m) if touches else rules.following_m
-        told, stamp_s = "told to " + ("be" if self._moving else "stay"), float(o.stamp_s[-1])
-        soon_m = away_m + rules.following_periods * max(away_m - before_m, 0.0)
+        told = "told to " + ("be" if self._moving else "stay")
+        leaving_m = max(away_m - before_m, 0.0) / periods
+        soon_m = away_m + rules.following_periods * leaving_m
         if soon_m > max_m:
             what = f"the hand is {away_m * 1e3:.1f} mm from where it was {told}"
             if away_m <= max_m:
-                what += f" and leaves it at {(away_m - before_m) / self._period_s * 1e3:.0f} mm/s"
+                what += f" and leaves it at {leaving_m / self._period_s * 1e3:.0f} mm/s"
             what += f"; {max_m * 1e3:.1f} mm are allowed"
             if touches:
                 what += f" while it presses with {float(np.linalg.norm(o.wrench_S[-1, :3])):.0f} N"
-            findings.append(GuardFinding("following", what, soon_m, max_m, stamp_s))
-        rad = min(_angle_rad(q, t[3:]) for t in targets)
+            findings.append(GuardFinding("following", what, soon_m, max_m, now_s))
+        rad = min(angle_rad(q, t[3:]) for t in targets)
         if rad > rules.following_rad:
             what = (
                 f"the hand is turned by {rad:.3f} rad from how it was {told}; {rules.following_rad:.3f} rad are allowed"
             )
-            findings.append(GuardFinding("following", what, rad, rules.following_rad, stamp_s))
+            findings.append(GuardFinding("following", what, rad, rules.following_rad, now_s))
 
     def _check_wrench(self, o: Observation, findings: list[GuardFinding]) -> None:
         """Count consecutive samples beyond the stop limit, also across blocks."""
@@ -348,22 +335,3 @@ def _select(o: Observation, good: np.ndarray[tuple[int], np.dtype[np.bool_]]) ->
     """Return the block with the chosen samples only."""
     chosen: dict[str, Any] = {name: getattr(o, name)[good] for name in SAMPLED}
     return replace(o, **chosen)
-
-
-def distance_to_path(point: list[float], path: list[list[float]]) -> float:
-    """Return the distance of a point (3,) from a path of points joined by straight lines."""
-    x, y, z = point
-    least = math.dist(point, path[0])
-    for (a, b, c), (d, e, f) in pairwise(path):
-        u, v, w = d - a, e - b, f - c
-        length_2 = u * u + v * v + w * w
-        along = 0.0 if length_2 == 0.0 else ((x - a) * u + (y - b) * v + (z - c) * w) / length_2
-        along = min(max(along, 0.0), 1.0)
-        least = min(least, math.dist(point, (a + along * u, b + along * v, c + along * w)))
-    return least
-
-
-def _angle_rad(a: list[float], b: list[float]) -> float:
-    """Return the angle between two rotations given as unit quaternions."""
-    half = abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3])
-    return 2.0 * math.acos(min(1.0, half))

@@ -64,27 +64,28 @@ class Supervisor(Robot):
             GuardTripped: A guard tripped; the arm is held, and every later cycle only holds and raises again.
             BackendError: As the robot itself raises them.
         """
-        if self._error is not None:
-            self._hold_one_period()
-            raise self._error
-        if (wrong := self._commands.check(command, self._newest)) is not None:
-            raise self._trip(wrong)
-        self._sensed.on_command(command)
-        try:
-            with self._lock:
+        with self._lock:
+            if self._error is not None:
+                self._hold_one_period()
+                raise self._error
+            if (wrong := self._commands.check(command, self._newest)) is not None:
+                raise self._trip(wrong)
+            self._sensed.on_command(command)
+            try:
                 observation = self._robot.cycle(command)
-        except BackendError as e:
-            self._on_device_error(e)
-            raise
-        observation, findings = self._sensed.check(observation)
-        if findings:
-            self._report(findings)
-        self._newest = observation
-        return observation
+            except BackendError as e:
+                self._on_device_error(e)
+                raise
+            observation, findings = self._sensed.check(observation)
+            if findings:
+                self._report(findings)
+            self._newest = observation
+            return observation
 
     def start(self, request: Request) -> Ticket:
         """See `Robot`."""
-        return self._robot.start(request)
+        with self._lock:
+            return self._robot.start(request)
 
     def hold(self) -> None:
         """See `Robot`; also from another thread, between two cycles."""
@@ -112,10 +113,9 @@ class Supervisor(Robot):
 
     def trip_by(self, error: GuardTripped) -> None:
         """Hold from now on because a guard above this robot (a skill's own) tripped; record it like the others."""
-        if error is not self._error:
-            self._robot.hold()
-            self._error = error
-            self._record(GuardFinding(error.guard, error.what, error.value, error.limit, error.stamp_s))
+        with self._lock:
+            if error is not self._error:
+                self._stop(error, GuardFinding(error.guard, error.what, error.value, error.limit, error.stamp_s))
 
     def _report(self, findings: list[GuardFinding]) -> None:
         for finding in findings:
@@ -129,24 +129,26 @@ class Supervisor(Robot):
             self.on_finding(finding)
 
     def _trip(self, finding: GuardFinding) -> GuardTripped:
-        """Hold, record the finding, and return the error to raise from now on."""
-        self._robot.hold()
-        self._record(finding)
+        """Stop because of a finding; return the error to raise from now on."""
         error = GuardTripped(finding.guard, finding.what, finding.value, finding.limit, finding.stamp_s)
-        self._error = error
+        self._stop(error, finding)
         return error
 
+    def _stop(self, error: BackendError, finding: GuardFinding) -> None:
+        """Raise `error` from now on, hold, and record the finding, in this order: recording may fail."""
+        self._error = error
+        self._robot.hold()
+        self._record(finding)
+
     def _on_device_error(self, error: BackendError) -> None:
-        """Hold and record that the robot itself failed."""
+        """Stop because the robot itself failed."""
         value, limit, stamp_s = 0.0, 0.0, self._newest.now_s
         guard = "device"
         if isinstance(error, SafetyStop):
             guard, value, limit, stamp_s = "wrench", error.value, error.limit, error.stamp_s
         elif isinstance(error, StaleReading):
             value, limit = error.age_s, error.max_age_s
-        self._robot.hold()
-        self._error = error
-        self._record(GuardFinding(guard, str(error), value, limit, stamp_s))
+        self._stop(error, GuardFinding(guard, str(error), value, limit, stamp_s))
 
     def _hold_one_period(self) -> None:
         """Let one more period pass at rest, as far as the robot still can."""

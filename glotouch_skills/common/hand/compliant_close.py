@@ -144,7 +144,7 @@ class _Closing:
         blocks = yield from self._arm.hold(BASELINE_S, tactile=self._tactile)
         for seen in blocks:
             self._seen_by(seen)
-        self._free_N = np.mean([_force_P(b) for b in blocks], axis=0)
+        self._free_N = np.mean([_force_P(self._arm, b) for b in blocks], axis=0)
         self._untouched = [b.tactile for b in blocks if b.tactile is not None]
 
     def contacts_apart_m(self) -> float:
@@ -178,7 +178,7 @@ class _Closing:
         for k in range(round(TIMEOUT_S / arm.period_s)):
             force_N = forces_N[min(k, len(forces_N) - 1)]
             seen = yield from self._one_period(force_N if k < len(forces_N) else None)
-            self._force_N = _force_P(seen)
+            self._force_N = _force_P(arm, seen)
             yield from self.refuse_above(_max_N(force_N), float(np.linalg.norm(self._force_N)))
             if k >= len(forces_N) and watch.still(seen.now_s, seen.gripper):
                 break
@@ -205,7 +205,7 @@ class _Closing:
 
     def _follow(self, seen: Observation) -> Motion[None]:
         """Follow a jaw if it alone pushes."""
-        arm, force = self._arm, float(_force_P(seen)[1])
+        arm, force = self._arm, float(_force_P(self._arm, seen)[1])
         if not (seen.gripper.moving and abs(force) > max(FOLLOW_FORCE_N, seen.gripper.force_N)):
             return
         side = float(np.sign(force))
@@ -216,7 +216,7 @@ class _Closing:
             yield from arm.shift(
                 side * left * y_B,
                 FOLLOW_SPEED_RATIO * self._speed_m_s,
-                guard=_follow_guard(side, self._seen_by),
+                guard=_follow_guard(arm, side, self._seen_by),
                 check=False,
                 tactile=self._tactile,
                 what="follow",
@@ -252,7 +252,7 @@ def _release(arm: Arm, opening_m: float) -> Motion[None]:
     yield from _drive_jaws(arm, opening_m, weak)
     for k in range(round(OPEN_TIMEOUT_S / arm.period_s)):
         (seen,) = yield from arm.hold(arm.period_s)
-        force = _force_P(seen)
+        force = _force_P(arm, seen)
         pressed = np.linalg.norm(force) > CAUGHT_FORCE_N
         still = watch.still(seen.now_s, seen.gripper)
         if pressed and not (weak and seen.gripper.force_N >= LOOSE_JAW_FORCE_N) and given < MAX_FREEING_M - MIN_STEP_M:
@@ -287,17 +287,17 @@ def _move_free(arm: Arm, force_P_N: Array, max_m: float) -> Motion[float]:
     moved = yield from arm.shift(
         length * way_B,
         FREEING_SPEED_M_S,
-        guard=lambda seen: "free" if np.linalg.norm(_force_P(seen)) < FREED_FORCE_N else None,
+        guard=lambda seen: "free" if np.linalg.norm(_force_P(arm, seen)) < FREED_FORCE_N else None,
         check=False,
         what="free the hand",
     )
     return max(moved.travelled_m, MIN_STEP_M)
 
 
-def _follow_guard(side: float, on_observation: Observer) -> Callable[[Observation], str | None]:
+def _follow_guard(arm: Arm, side: float, on_observation: Observer) -> Callable[[Observation], str | None]:
     def guard(seen: Observation) -> str | None:
         on_observation(seen)
-        force = _force_P(seen)
+        force = _force_P(arm, seen)
         if not np.linalg.norm(force) <= MAX_HAND_FORCE_N:
             return "pressed"
         both = seen.gripper.force_N > max(FOLLOW_FORCE_N, side * force[1])
@@ -306,6 +306,6 @@ def _follow_guard(side: float, on_observation: Observer) -> Callable[[Observatio
     return guard
 
 
-def _force_P(seen: Observation) -> Array:
-    """Return the mean tared force (3,) of one period in P's axes, which are the sensor's."""
-    return np.asarray(seen.wrench_S[:, :3].mean(axis=0))
+def _force_P(arm: Arm, seen: Observation) -> Array:
+    """Return the mean tared force (3,) of one period in P's axes."""
+    return np.asarray(arm.rotation_P_S @ seen.wrench_S[:, :3].mean(axis=0))

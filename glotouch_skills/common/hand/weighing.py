@@ -43,7 +43,7 @@ def weigh(arm: Arm) -> Motion[Weighed]:
     yield from arm.hold(STAND_S)
     blocks = yield from arm.hold(WEIGH_S)
     wrench_S = np.concatenate([b.wrench_S for b in blocks]).mean(axis=0)
-    rotation = arm.pose_B_P.rotation
+    rotation = arm.rotation_B_S
     force_B, moment_B = rotation @ wrench_S[:3], rotation @ wrench_S[3:]
     return Weighed(-float(force_B[2]), float(np.hypot(moment_B[0], moment_B[1])))
 

@@ -179,7 +179,7 @@ class Squeezing:
         half_diagonal = 0.5 * float(np.hypot(*contour.size_m)) if contour.family != "circle" else contour.radius_m
         noise_m = pad_noise_m(_untouched(closing))
         object_motion = estimate_object_motion(
-            [*closing, *blocks], gripper.pad_window_m[0], middle, half_diagonal, noise_m
+            [*closing, *blocks], gripper.pad_window_m[0], middle, half_diagonal, noise_m, arm.rotation_P_S[1]
         )
         measured = self._context.world.container.pose_B_K.inverse().apply(blocks[-1].pose_B_P.position_m)
         layer = make_layer(

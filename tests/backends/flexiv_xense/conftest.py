@@ -24,7 +24,7 @@ def open_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Open
     """Opens a robot over a driver in a thread of this process, with scripted devices."""
     ends: list[Callable[[], None]] = []
 
-    def start(vendor: ScriptedVendor, **options: object) -> FlexivXenseRobot:
+    def start(vendor: ScriptedVendor, *, moves: bool = True, **options: object) -> FlexivXenseRobot:
         monkeypatch.setattr(connect, "load_vendor", lambda *_, **__: vendor)
         address = f"ipc://{tmp_path / f'driver{len(ends)}'}"
         socket = DriverSocket(address)
@@ -49,7 +49,7 @@ def open_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Open
         robot: FlexivXenseRobot | None = None
         ends.append(end)
         opened = link.ask(
-            backend._request(options_, settings, b"", link.number(), True), Opened, on_progress=lambda _: None
+            backend._request(options_, settings, b"", link.number(), moves), Opened, on_progress=lambda _: None
         )
         link.beat()
         first = link.wait(0, Block)

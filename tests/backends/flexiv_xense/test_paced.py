@@ -65,6 +65,21 @@ def test_without_setpoints_the_arm_is_held(open_robot: Open) -> None:
     assert robot.late_periods > 10
 
 
+def test_a_hold_that_the_arm_refuses_is_repeated(open_robot: Open) -> None:
+    """The arm would go on with the velocity of its last setpoint."""
+    vendor = ScriptedVendor(stepped=False)
+    robot = open_robot(vendor, pace="real")
+    robot.cycle(a_moving_setpoint())
+    vendor.broken["SendCartesianMotionForce"] = RuntimeError("busy")
+    with pytest.raises(BackendError, match="busy"):
+        cycle_twice(robot)
+    robot.hold()
+    time.sleep(0.2)  # all that a silent client brings about has happened
+    assert vendor.sent[-1][1] != [0.0] * 6
+    vendor.broken.clear()
+    assert eventually(lambda: vendor.sent[-1][1] == [0.0] * 6)
+
+
 def test_losing_the_client_ends_the_session(open_robot: Open, tmp_path: Path) -> None:
     vendor = ScriptedVendor(stepped=False)
     robot = open_robot(vendor, pace="real")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -66,3 +67,20 @@ def test_no_request_ends_the_driver(open_robot: Open) -> None:
     link._socket.send(messages.encode(messages.HoldRequest(number=10**9)))
     answers = iter(lambda: link._receive(5.0), None)
     assert any(getattr(a, "number", 0) == 10**9 for a in answers)
+
+
+def test_no_limit_of_a_client_limits_nothing() -> None:
+    """NaN passes every comparison, so it is refused as a message."""
+    limits = messages.ArmLimits(
+        q_min=(-3.0,) * 7, q_max=(3.0,) * 7, dq_max=(2.0,) * 7, speed_m_s=0.25, acceleration_m_s2=1.0,
+        stop_acceleration_m_s2=2.0, force_N=28.5, torque_Nm=10.0, max_age_s=0.2,
+    )  # fmt: skip
+    read = messages._reader(messages.ArmLimits)
+    assert read(messages.encode(limits)) == limits
+    for name, value in (("dq_max", float("nan")), ("dq_max", 11.0), ("q_min", float("nan")), ("q_max", 1e3)):
+        with pytest.raises(messages.BadMessage):
+            read(messages.encode(msgspec.structs.replace(limits, **{name: (value,) * 7})))
+    for mass_kg, at_m in ((float("nan"), 0.0), (-1.0, 0.0), (0.1, float("nan")), (0.1, 2.0)):
+        body = messages.encode(messages.PayloadRequest(number=1, ticket=1, mass_kg=mass_kg, com_P_m=(at_m,) * 3))
+        with pytest.raises(messages.BadMessage):
+            messages.decode_request(body)

@@ -65,6 +65,18 @@ def test_the_height_of_a_new_candidate_is_that_of_the_trace_and_its_top_is_unkno
     assert (new.height_m, new.top_touched) == (0.018, False)
 
 
+def test_a_new_candidate_never_takes_the_index_of_a_traced_object(candidate):
+    """A candidate that was left out, because it is the same body as another one, is still on the map."""
+    belief = SearchMap.blank((0.3, 0.3), expected=3).with_exclusion(candidate.contour, 0.01, 0)
+    belief = belief.with_exclusion(dataclasses.replace(candidate.contour, centre_K_m=np.array([0.2, 0.2])), 0.01, 1)
+    contacts = tuple(dataclasses.replace(c, tip_K_m=c.tip_K_m - [0.0, 0.2, 0.0], point_K_m=c.point_K_m - [0.0, 0.2])
+                     for c in half_a_box())  # fmt: skip
+    traced = OutlineTrace(contacts, outline_of(contacts, R), np.zeros(2), np.zeros((0, 2)))
+    admitted = admit(belief, (candidate,), contacts[0], traced, 0.018, 0.01)
+    assert [c.index for c in admitted.candidates] == [0, 2]
+    assert admitted.belief.found == 3
+
+
 def test_what_stands_too_near_for_another_object_is_the_same(candidate):
     """16 mm off the contacts, where no other object can stand (30 mm); 26 mm off one can."""
     two = {}

@@ -74,6 +74,12 @@ def test_before_any_search_it_is_the_prior() -> None:
     assert one.chance_left == pytest.approx(1 - (1 - Q) ** 2)
 
 
+def test_an_obstacle_hides_nothing() -> None:
+    """It is only the place of a contact with a traced object."""
+    belief = blank().with_exclusion(DISC, 0.01)
+    assert belief.with_obstacle((-0.06, -0.08), 0.012).hidden.share == pytest.approx(belief.hidden.share)
+
+
 def test_when_all_is_swept_nothing_is_left() -> None:
     belief = blank().with_path(rows(0.01))
     assert (belief.chance_left, belief.complete) == (0.0, True)
@@ -81,8 +87,8 @@ def test_when_all_is_swept_nothing_is_left() -> None:
 
 
 def test_between_wide_rows_only_small_objects_hide() -> None:
-    left = blank().with_path(rows(0.0275)).hidden
-    assert set(left.discs.radius[left.weight > 0]) == {0.0075}
+    left = blank().with_path(rows(0.033)).hidden
+    assert set(left.discs.radius[left.weight > 0]) == {0.0088}
     assert 0.0 < left.share < 1 / len(ANY.radii_m)
 
 

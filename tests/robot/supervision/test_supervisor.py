@@ -25,8 +25,8 @@ from glotouch_bt.robot import (
 )
 from glotouch_bt.robot.fake import FakeRobot, forward
 from glotouch_bt.robot.supervision.limits import GUARDS, SupervisionLimits
-from glotouch_bt.robot.supervision.readings import distance_to_path
 from glotouch_bt.robot.supervision.supervisor import MAX_RECORDED
+from glotouch_bt.robot.supervision.targets import distance_to_path
 from tests.robot.supervision.supervised import (
     Device,
     Spoil,
@@ -352,6 +352,32 @@ def test_following__a_hand_that_leaves_its_path_fast_is_stopped_before_the_limit
         spin(robot, 100)
     assert trip.value.stamp_s < 0.2 + 0.011
     assert found[-1].guard == "following"
+
+
+def moving_command(k: int) -> Command:
+    """A setpoint on the way at 0.1 m/s along a circle about the base, 1 mm a period."""
+    radius_m = float(np.hypot(*forward(FakeRobot().description, HOME).position_m[:2]))
+    return setpoint(HOME + 0.001 * k / radius_m * np.eye(7)[0], 0.1 / radius_m * np.eye(7)[0])
+
+
+@pytest.mark.parametrize(("away_m", "trips"), [(0.015, False), (0.03, True)])
+def test_following__an_arm_that_brakes_may_not_go_farther_than_it_must(away_m: float, trips: bool) -> None:
+    """v^2 / 2a = 2.5 mm, 10 mm of lag, 6 mm of following error."""
+
+    def runs_away(seen: Observation) -> Observation:
+        return dataclasses.replace(
+            seen, position_B_P=np.add(seen.position_B_P, (0.0, 0.0, away_m)), dq=seen.dq + 0.2 * np.eye(7)[0]
+        )
+
+    device = Device(runs_away, since=6)
+    robot, _ = supervised(device)
+    for k in range(6):
+        robot.cycle(moving_command(k))
+    if trips:
+        with pytest.raises(GuardTripped, match="told to stop"):
+            spin(robot, 1)
+    else:
+        spin(robot, 20)
 
 
 def test_distance_to_path__between_its_points() -> None:

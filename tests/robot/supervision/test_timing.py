@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.robot import HOLD, Command, GuardTripped, Observation
+from glotouch_bt.robot.fake import forward
 from tests.robot.supervision.supervised import Device, Spoil, setpoint, spin, supervised
 
 
@@ -121,3 +122,28 @@ def test_samples_missing__the_first_block_of_several_samples_sets_the_rate() -> 
     assert found == []
     with pytest.raises(GuardTripped, match="8 of 10 samples are missing"):
         spin(robot, 10)
+
+
+@pytest.mark.parametrize(("extra", "away_m"), [(7, 0.012), (1, 0.0019)])
+def test_following__a_device_that_held_by_itself_is_ahead_of_the_next_command(extra: int, away_m: float) -> None:
+    """After a late command the arm rests at v^2 / 2a beyond the last one: 11 mm at 0.21 m/s.
+
+    In two periods it may go as far as in twice one.
+    """
+    device = Late(extra, 8, lost=False)
+    home = np.array(device.description.home_q)
+    radius_m = float(np.hypot(*forward(device.description, home).position_m[:2]))
+    dq = 0.21 / radius_m * np.eye(7)[0]
+    poses = [setpoint(home + 0.01 * k * dq, dq) for k in range(9)]
+    device._spoil, device._since = lambda seen: ahead(seen, away_m), 8 + extra
+    robot, found = supervised(device)
+    for command in poses:
+        robot.cycle(command)
+    assert {f.guard for f in found} <= {"overrun"}
+
+
+def ahead(seen: Observation, away_m: float) -> Observation:
+    """Return the block with the hand farther along its circle about the base."""
+    position = np.array(seen.position_B_P)
+    along = np.cross([0.0, 0.0, 1.0], position)
+    return dataclasses.replace(seen, position_B_P=position + away_m * along / np.linalg.norm(along[-1]))

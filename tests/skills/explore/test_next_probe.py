@@ -72,9 +72,17 @@ def test_with_a_target_only_what_may_be_it_is_measured(asked, things) -> None:
 
 def test_what_was_measured_last_replaces_what_was_known(asked, things) -> None:
     new = replace(things[1], height_m=0.05)
-    skill = asked(things, measured=new, before=(ProbeTouch(1, "outline"),))
+    skill = asked(things, measured=new, chosen="outline", before=(ProbeTouch(1, "outline"),))
     assert skill.candidates == (things[0], new, things[2])
     assert (skill.candidate, skill.next_part) == (new, "top")
+
+
+def test_begun_anew_it_keeps_what_was_found_since(asked, things) -> None:
+    """`candidate` is still the one that was measured last, the search has gone on meanwhile."""
+    made = tuple(ProbeTouch(i, part) for i in (1, 2, 0) for part in ("outline", "top"))
+    skill = asked(things, measured=replace(things[0], height_m=0.05), chosen="", before=made)
+    assert skill.measured_enough
+    assert skill.candidates == things
 
 
 @pytest.mark.parametrize("known", [None, ()])

@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from ..checks import MAX_TURN_RAD_S
 from ..clock import Clock
 from ..faults import DeviceFault, vendor_call
 from ..messages import ArmEvent, Numbers, Open, Setpoint
@@ -28,8 +29,6 @@ MODE_POLL_S = 0.01
 """Interval between two checks while waiting."""
 MAX_EVENTS = 12
 """Number of log entries attached to an error."""
-MAX_ANGULAR_RAD_S = 4.0
-"""Angular speed limit of the arm's own smoothing; high enough never to act."""
 MAX_ANGULAR_RAD_S2 = 40.0
 """Angular acceleration limit of the arm's own smoothing, far above the plan's 7.5 rad/s2: setpoints come 10 ms apart,
 so a small error needs much acceleration. Source: measured; with 10 rad/s2 the simulated hand lagged by 0.1 rad."""
@@ -239,7 +238,7 @@ class DriverArm(ABC):
         limits = self._limits
         return (
             SMOOTHING_HEADROOM * limits.speed_m_s,
-            MAX_ANGULAR_RAD_S,
+            MAX_TURN_RAD_S,
             SMOOTHING_HEADROOM * max(limits.acceleration_m_s2, limits.stop_acceleration_m_s2),
             MAX_ANGULAR_RAD_S2,
         )

@@ -14,6 +14,8 @@ MOVING_M_S = 0.002
 """Report the jaws as moving above this speed. Source: ours."""
 MAX_RESPONSE_S = 1.0
 """After a command the status must change within this time. Source: ours."""
+MAX_REPEAT_S = 0.2
+"""Jaws that move cannot report the same for longer. Source: the supervisor's limit for old reports."""
 MIN_MOVE_M = 1e-3
 """A nearer target need not change the status. Source: ours."""
 GRIPPED_FORCE_SHARE = 0.5
@@ -106,7 +108,8 @@ class DriverGripper:
         """Return the newest status.
 
         Raises:
-            DeviceFault: stale: the jaws should have moved by now, but the status does not change.
+            DeviceFault: stale: the jaws should have moved by now, or report that they move, but the status does not
+                change. A link that is lost while the jaws rest shows only at the next command.
         """
         with vendor_call("reading the gripper", "link"):
             status = self._device.get_gripper_status()
@@ -116,6 +119,14 @@ class DriverGripper:
             )
         self._take(status)
         now, target = self.state.stamp_s, self._target
+        if self.state.moving and (age_s := now - self._changed_s) > MAX_REPEAT_S:
+            raise DeviceFault(
+                "stale",
+                f"the gripper reports moving jaws at {self.state.aperture_m / MM:.1f} mm again and again; its link is "
+                f"lost, and then this model {self._link_loss_effect}",
+                age_s=age_s,
+                limit_s=MAX_REPEAT_S,
+            )
         if target is None or self._answered or now - self._commanded_s < MAX_RESPONSE_S:
             return self.state
         closing = target.aperture_m < self.state.aperture_m

@@ -40,6 +40,8 @@ MOVED_TURN_RAD = float(np.deg2rad(3.0))
 """Turn above which the object counts as moved: the standard deviation of a sequence's pose in `recognition`."""
 MOVED_COMPLIANCE_M = 0.003
 """Compliance above which the object counts as moved."""
+Y_S: Array = np.array([0.0, 1.0, 0.0])
+"""Direction of y_P for a sensor whose axes are parallel to P's."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,7 @@ def estimate_object_motion(
     middle_x_m: float = 0.0,
     half_diagonal_m: float = 0.03,
     noise_m: tuple[float, float] = (PAD_NOISE_M, PAD_NOISE_M),
+    y_P_S: Array = Y_S,
 ) -> ObjectMotion:
     """Estimate the object's motion during a whole closure.
 
@@ -88,6 +91,7 @@ def estimate_object_motion(
         middle_x_m: Centre of the object's outline along x_P, from the pads.
         half_diagonal_m: Half diagonal of the outline.
         noise_m: As in `Layer`.
+        y_P_S: (3,) direction of y_P along the axes of the force sensor.
     """
     if len(blocks) <= BASELINE_PERIODS:
         return ObjectMotion(0.0, 0.0, 0.0, False)
@@ -96,7 +100,7 @@ def estimate_object_motion(
     aperture = np.array([b.gripper.aperture_m for b in blocks])
     jaw = np.array([b.gripper.force_N for b in blocks])
     now = np.array([b.now_s for b in blocks])
-    side_N = np.array([b.wrench_S[:, 1].mean() for b in blocks])
+    side_N = np.array([(b.wrench_S[:, :3] @ y_P_S).mean() for b in blocks])
     side_N -= side_N[:BASELINE_PERIODS].mean()
     hand = np.array([b.position_B_P[-1] for b in blocks]) @ rotation[:, 1]
     frames = [b.tactile for b in blocks if b.tactile is not None]

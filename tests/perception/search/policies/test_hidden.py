@@ -40,5 +40,5 @@ def test_a_known_number_is_searched_as_before() -> None:
     """The search of objects of the usual size ends where small ones could still hide."""
     belief = SearchMap.blank(HALF, expected=5).with_path(rows(0.0275))
     assert POLICY.next_stretch(belief, belief.path_K_m[-1]) is None
-    unknown = blank().with_path(rows(0.0275))
+    unknown = blank().with_path(rows(0.033))
     assert POLICY.next_stretch(unknown, unknown.path_K_m[-1]) is not None

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.perception.touch import ObjectMotion, estimate_object_motion
-from glotouch_bt.robot import GripperState, Observation, TactileFrame
+from glotouch_bt.robot import GripperState, Observation, Pose, TactileFrame
 
 SHAPE, PAD_WIDTH, GEL = (35, 20), 0.0172, 4e-4
 DOWN = np.array([0.0, 1.0, 0.0, 0.0])  # x_P = x_B, y_P = -y_B, z_P = -z_B
@@ -72,6 +74,18 @@ def test_off_centre_block_slides_to_the_centre(off: float, side: float, width: f
     assert motion.turn_rad == 0.0
     assert motion.compliance_m < 0.0006
     assert motion.moved == (abs(motion.slide_m) > 0.0025)
+
+
+@pytest.mark.parametrize("yaw_deg", [0.0, 35.0, 90.0, 180.0])
+def test_a_sensor_that_is_turned_against_the_jaws(yaw_deg: float) -> None:
+    """Closed form: P is turned about z_E by the yaw, so y_P is (-sin, cos, 0) along the sensor's axes."""
+    axes = Pose.planar((0.0, 0.0, 0.17), np.deg2rad(yaw_deg)).rotation
+    blocks = [
+        dataclasses.replace(b, wrench_S=np.hstack([b.wrench_S[:, :3] @ axes.T, b.wrench_S[:, 3:]]))
+        for b in pushed(0.008, 0.04, 3)
+    ]
+    motion = estimate_object_motion(blocks, PAD_WIDTH, y_P_S=axes[:, 1])
+    assert motion.slide_m == pytest.approx(-0.008, abs=0.0006)
 
 
 def test_compliant_hand_does_not_slide_the_object() -> None:
