@@ -49,7 +49,7 @@ class Moment:
 
 MOMENTS = (
     Moment("sweep", "sweep", When(node="guarded_sweep", after_s=4.0)),
-    Moment("contact", "sweep", When(node="guarded_sweep", force_above_N=2.0)),
+    Moment("contact", "sweep", When(node="guarded_sweep", force_above_N=1.0)),
     Moment("draw", "pickup", When(node="tool_pickup", aperture_below_m=0.03)),
     Moment("squeeze", "pick_at", When(node="grasp", after_s=2.0, aperture_below_m=0.05)),
     Moment("lift", "pick_at", When(node="lift", after_s=0.5)),
