@@ -20,7 +20,7 @@ from glotouch_bt.perception.search import (
     lost_among,
     of_another,
     refined,
-    seek,
+    seek_next,
     trace_bodies,
     trace_more,
 )
@@ -113,28 +113,35 @@ def explore(
     execute, ended = _limited(world, budget_m), "complete"
     try:
         while not belief.complete:
-            sought = drive(seek(belief, policy, world.tip_K_m, lowered=world.lowered), execute)
+            tip_K_m, radius = world.tip_K_m, world.tip_radius_m
+            search = seek_next(belief, candidates, policy, tip_K_m, radius, orbit.exclusion_m, lowered=world.lowered)
+            sought, candidates = drive(search, execute)
             maps += belief, sought.belief
             belief = sought.belief
+            found = _updated(found, world.travel_m, candidates)
             if sought.contact is None:
                 ended = "complete" if belief.complete else "exhausted"
                 break
-            first, radius = sought.contact, world.tip_radius_m
+            first = sought.contact
             plan = trace_bodies(
                 belief, candidates, first, world.tip_K_m, radius, orbit.rule(), orbit.height_m, orbit.exclusion_m
             )
             admitted = drive(plan, execute)[0]
             belief, candidates = admitted.belief, admitted.candidates
-            current = {c.index: c for c in candidates}
-            found |= {i: _again(found.get(i), world.travel_m, current[i]) for i in admitted.changed}
-            found = {i: found[i] for i in current}
+            found = _updated(found, world.travel_m, candidates)
     except _OutOfBudget:
         ended = "budget"
     return Explored(tuple(found[i] for i in sorted(found)), world.travel_m, ended, belief, tuple(maps))
 
 
-def _again(before: Traced | None, travel_m: float, candidate: Candidate) -> Traced:
-    return Traced(travel_m, candidate, () if before is None else (*before.earlier, before))
+def _updated(found: dict[int, Traced], travel_m: float, candidates: tuple[Candidate, ...]) -> dict[int, Traced]:
+    """Return the present candidates; those that changed were traced now."""
+    now: dict[int, Traced] = {}
+    for c in candidates:
+        before = found.get(c.index)
+        changed = before is None or before.candidate is not c
+        now[c.index] = Traced(travel_m, c, () if before is None else (*before.earlier, before)) if changed else before
+    return now
 
 
 def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDGET_M) -> tuple[Traced, ...]:

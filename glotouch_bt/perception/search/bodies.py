@@ -94,6 +94,21 @@ def bodies(
     return tuple(sorted(parts, key=len, reverse=True))
 
 
+def division(
+    contacts: tuple[Contact, ...], radius_m: float, path_K_m: Array
+) -> tuple[float, tuple[tuple[Contact, ...], ...]]:
+    """Return the gain of log evidence by the best division into two bodies, and their contacts.
+
+    The gain is -inf, and the contacts are whole, if there is no such division. The arguments are those of `bodies`.
+    """
+    whole = -np.inf, (contacts,)
+    if radius_m == 0 or len(contacts) < 2 * MIN_PART:
+        return whole
+    free = _near(path_K_m, contacts)
+    evidence, parts = _best_cut(contacts, radius_m, free, -np.inf)
+    return (evidence - outline_of(contacts, radius_m, free).log_evidence, tuple(parts)) if parts else whole
+
+
 @dataclass(frozen=True)
 class Doubt:
     """Two neighbours that may be one body, and the probability that they are."""
@@ -187,6 +202,14 @@ def _divided(contacts: tuple[Contact, ...], radius_m: float, free: Array, gain: 
     limit = outline_of(contacts, radius_m, free).log_evidence + gain
     if limit > WELL_NATS * len(contacts) + gain:
         return [contacts]
+    _, best = _best_cut(contacts, radius_m, free, limit)
+    return [body for side in best for body in _divided(side, radius_m, free, gain)] if best else [contacts]
+
+
+def _best_cut(
+    contacts: tuple[Contact, ...], radius_m: float, free: Array, limit: float
+) -> tuple[float, list[tuple[Contact, ...]]]:
+    """Return the division in two with the largest log evidence above a limit, and this evidence; else no contacts."""
     best: list[tuple[Contact, ...]] = []
     for part in _partitions(np.array([c.point_K_m for c in contacts])):
         sides = [tuple(c for c, mine in zip(contacts, part == side, strict=True) if mine) for side in (True, False)]
@@ -197,7 +220,7 @@ def _divided(contacts: tuple[Contact, ...], radius_m: float, free: Array, gain: 
         evidence = sum(o.log_evidence for o in outlines)
         if evidence > limit and min(min(o.contour.size_m) for o in outlines) >= MIN_BODY_M:
             limit, best = evidence, sides
-    return [body for side in best for body in _divided(side, radius_m, free, gain)] if best else [contacts]
+    return limit, best
 
 
 def _partitions(points: Array) -> list[Mask]:

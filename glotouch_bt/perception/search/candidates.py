@@ -14,6 +14,7 @@ from glotouch_bt.perception.search.bodies import (
     Doubt,
     bodies,
     chance_of_fewer,
+    division,
     doubts,
     outline_of,
     same_body,
@@ -65,6 +66,12 @@ HALF_QUALITY_SD_M = 0.005
 """Standard deviation of the centre at quality 1/2."""
 MAX_LENGTH_M = 0.125
 """Maximum length of a candidate after a merge."""
+TWO_BODIES = {"intercept": -3.9, "per_nat": 0.29}
+"""Log odds that a candidate is two bodies, before their number is considered, and what each nat gained by its best
+division adds. Source: the counts of `SEPARATE_NATS`, and 21 layouts in which objects were missed (planar, seeds
+61844-61892 of touching_five)."""
+UNMET = 0.01
+"""Probability that an object was not met although the path touched its place. Source: ours."""
 
 
 @dataclass(frozen=True)
@@ -130,17 +137,53 @@ def admit(
     if len(parts) == 1 and max(better.contour.size_m) > MAX_LENGTH_M:
         # Only one object can be here: keep the newest contacts; some of the earlier ones were another object's.
         better, parts = _with(better, traced.contacts, traced.outline), (traced.contacts,)
-    every = {c.index: c for c in known} | {better.index: better}
+    return _with_parts(belief, known, better, parts, radius, exclusion_m)
+
+
+def _with_parts(
+    belief: SearchMap,
+    known: tuple[Candidate, ...],
+    whole: Candidate,
+    parts: tuple[tuple[Contact, ...], ...],
+    radius_m: float,
+    exclusion_m: float,
+) -> Admitted:
+    """Return map and candidates with one candidate for each part of `whole`; the first one keeps its index."""
+    every = {c.index: c for c in known} | {whole.index: whole}
     changed: list[int] = []
     for body in parts:
-        index = _next_index(belief, every.values()) if changed else better.index
-        outline = outline_of(body, radius)
-        every[index] = replace(better, index=index)
+        index = _next_index(belief, every.values()) if changed else whole.index
+        every[index] = replace(whole, index=index)
         if len(parts) > 1:
-            every[index] = _with(every[index], body, outline)
+            every[index] = _with(every[index], body, outline_of(body, radius_m))
         belief = belief.with_exclusion(_occupied(every[index]), exclusion_m, index)
         changed.append(index)
-    return _admitted(belief, every, radius, better.index, tuple(changed))
+    return _admitted(belief, every, radius_m, whole.index, tuple(changed))
+
+
+def divided(belief: SearchMap, known: tuple[Candidate, ...], radius_m: float, exclusion_m: float) -> Admitted | None:
+    """Divide the candidate that is probably two bodies, because objects are missing; None if none probably is.
+
+    With K of N objects traced, each met with probability 1 - h, the odds that K candidates are K + 1 bodies change by
+    the ratio of C(N, B) (1 - h)^B h^(N - B) for B = K + 1 and B = K: (N - K) / (K + 1) * (1 - h) / h.
+
+    Args:
+        belief, known: Map and candidates.
+        radius_m: Radius of the ball; 0 for another section, whose candidates are never divided.
+        exclusion_m: As for `admit`.
+    """
+    missing = 0 if belief.expected is None else belief.expected - belief.found
+    if missing <= 0 or not known:
+        return None
+    hidden = max(belief.anywhere.share, UNMET)
+    cuts = {c.index: division(c.contacts, radius_m, belief.path_K_m) for c in known}
+    whole = max(known, key=lambda c: cuts[c.index][0])
+    gain, parts = cuts[whole.index]
+    log_odds = TWO_BODIES["intercept"] + TWO_BODIES["per_nat"] * min(gain, SEPARATE_NATS)
+    if log_odds + np.log(missing / (belief.found + 1) * (1.0 - hidden) / hidden) <= 0.0:
+        return None
+    parts = tuple(sorted(parts, key=len, reverse=True))
+    return _with_parts(belief, known, whole, parts, radius_m, exclusion_m)
 
 
 def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclusion_m: float) -> Admitted:

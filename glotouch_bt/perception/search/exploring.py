@@ -1,18 +1,63 @@
-"""Exploration of one touched object: trace it, decide how many bodies it is, and check the doubtful ones."""
+"""Exploration: find the next object, trace it, decide how many bodies it is, and check the doubtful ones."""
 
 from __future__ import annotations
 
 from functools import partial
 
-from glotouch_bt.perception.search.candidates import Admitted, admit, joins, of_another, part_of, regroup
+from glotouch_bt.perception.search.candidates import (
+    UNMET,
+    Admitted,
+    admit,
+    divided,
+    joins,
+    of_another,
+    part_of,
+    regroup,
+)
 from glotouch_bt.perception.search.map import SearchMap
 from glotouch_bt.perception.search.moves import SearchPlan
+from glotouch_bt.perception.search.policies import SearchPolicy
+from glotouch_bt.perception.search.seeking import Sought, seek
 from glotouch_bt.perception.search.tracing import Elsewhere, OutlineTrace, TraceParams, trace, trace_more
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.robot import Array
 
 CHECKED_CONTACTS = 12
 """Number of contacts from which on a doubtful candidate is not traced further. Source: ours."""
+
+
+def seek_next(
+    belief: SearchMap,
+    known: tuple[Candidate, ...],
+    policy: SearchPolicy,
+    tip_K_m: Array,
+    tip_radius_m: float,
+    exclusion_m: float,
+    *,
+    lowered: bool,
+    round_tip: bool = True,
+) -> SearchPlan[tuple[Sought, tuple[Candidate, ...]]]:
+    """Search for the next object; where one of a known number is missing, decide whether a candidate is two bodies.
+
+    Args:
+        belief, known: Map and candidates.
+        policy, tip_K_m, lowered: As for `seek`.
+        tip_radius_m, round_tip: As for `trace`.
+        exclusion_m: As for `admit`.
+    """
+    radius, enough = tip_radius_m if round_tip else 0.0, UNMET
+    while True:
+        sought = yield from seek(belief, policy, tip_K_m, lowered=lowered, enough=enough)
+        belief, tip_K_m, lowered = sought.belief, sought.tip_K_m, sought.lowered
+        if sought.contact is not None or belief.complete:
+            return sought, known
+        two = divided(belief, known, radius, exclusion_m)
+        if two is not None:
+            belief, known = two.belief, two.candidates
+        elif enough > 0.0:
+            enough = 0.0
+        else:
+            return sought, known
 
 
 def trace_bodies(

@@ -15,6 +15,8 @@ from glotouch_bt.robot import Array, ParamError, frozen_array
 
 PATH_STEP_M = 0.002
 """Spacing of the path samples."""
+DROPPED_M = 0.004
+"""Distance from a dropped position within which a point counts as the same."""
 GRID_STEP_M = 0.005
 """Spacing of grids over the permitted region."""
 MAX_PROTRUSION_M = 0.010
@@ -154,6 +156,13 @@ class SearchMap:
         point = np.asarray(point_K_m, dtype=np.float64).ravel()[None, :2]
         return replace(self, dropped=_frozen(np.concatenate([self.dropped, point])))
 
+    def is_dropped(self, points_K_m: Array) -> Mask:
+        """Return (n,) True for points (n, 2) that are dropped positions, within `DROPPED_M`."""
+        points = np.asarray(points_K_m, dtype=np.float64).reshape(-1, 2)
+        if len(self.dropped) == 0:
+            return np.zeros(len(points), dtype=np.bool_)
+        return np.asarray(np.linalg.norm(points[:, None] - self.dropped[None], axis=2).min(axis=1) < DROPPED_M)
+
     def with_obstacle(self, point_K_m: npt.ArrayLike, radius_m: float) -> SearchMap:
         """Add a disc that the tip's centre must not enter; it does not count as an object."""
         if not (np.isfinite(radius_m) and radius_m > 0):
@@ -263,6 +272,11 @@ class SearchMap:
         """
         missed = self.doubt * self.anywhere.share if self.doubt > 0.0 else 0.0
         return missed / (missed + 1.0 - self.doubt) if missed > 0.0 else 0.0
+
+    def is_searched(self, share: float) -> bool:
+        """Return True if objects of a known number are missing, and less than a share of the places is left."""
+        short = self.expected is not None and self.found < self.expected
+        return short and share > 0.0 and self.anywhere.share < share
 
     @property
     def complete(self) -> bool:

@@ -25,8 +25,6 @@ HINT_BEFORE_M = 0.015
 """Distance before a hint's contact at which its approach starts."""
 HINT_PAST_M = 0.006
 """Distance past a hint's contact at which its approach ends."""
-TAKEN_M = 0.004
-"""Minimum distance of an entry position from dropped ones."""
 BESIDE_M = (0.025, 0.040, 0.055, 0.070)
 """Distances from a contact from above at which the ball is lowered beside the object."""
 BESIDE_DIRECTIONS = 8
@@ -42,14 +40,18 @@ class Sought:
         contact: Side contact with a new object; None if nothing is left to explore or to reach, or if hardly anything
             of an unknown number can be left.
         lowered: The ball is at sensing height.
+        tip_K_m: (2,) position of the ball.
     """
 
     belief: SearchMap
     contact: Contact | None
     lowered: bool
+    tip_K_m: Array
 
 
-def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bool) -> SearchPlan[Sought]:
+def seek(
+    belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bool, enough: float = 0.0
+) -> SearchPlan[Sought]:
     """Follow the policy until a side contact with a new object, then retreat from it.
 
     Travelled paths at sensing height become free space. A refused move drops its frontier, and so does a sweep that
@@ -61,15 +63,16 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
         policy: Policy for the next sweep.
         tip_K_m: (2,) position of the ball.
         lowered: The ball is at sensing height.
+        enough: Share of the places left below which the search for a known number ends.
     """
     tip, hops, cornered = np.asarray(tip_K_m, dtype=np.float64)[:2], 0, False
-    while (lowered and belief.hints) or not belief.complete:
+    while (lowered and belief.hints) or not (belief.complete or belief.is_searched(enough)):
         if lowered and belief.hints:
             hint, belief = belief.hints[0], belief.with_hints(belief.hints[1:])
             belief, contact, tip = yield from _follow(belief, hint, tip)
             if contact is not None:
                 outcome = yield Move("retreat", tip - RETREAT_M * contact.approach_K[:2])
-                return Sought(belief.with_path(outcome.path_K_m), contact, True)
+                return Sought(belief.with_path(outcome.path_K_m), contact, True, outcome.tip_K_m)
             continue
         before, stretch = belief, policy.next_stretch(belief, tip)
         if stretch is not None and (cornered or not lowered) and not stretch.raised:
@@ -77,7 +80,7 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
         if stretch is None:
             spot = _way_in(policy, belief, tip, lowered=lowered) if hops < MAX_HOPS else None
             if spot is None:
-                return Sought(belief, None, lowered)
+                return Sought(belief, None, lowered, tip)
             hops += 1
             stretch, cornered = Stretch(spot[None, :], raised=True), False
         for waypoint in stretch.waypoints_K_m:
@@ -106,13 +109,13 @@ def seek(belief: SearchMap, policy: SearchPolicy, tip_K_m: Array, *, lowered: bo
                 outcome = yield Move("retreat", tip - RETREAT_M * side.approach_K[:2])
                 tip, belief = outcome.tip_K_m, belief.with_path(outcome.path_K_m)
                 if not belief.knows(side):
-                    return Sought(belief, side, True)
+                    return Sought(belief, side, True, tip)
             belief = belief.with_dropped(place)
             break
         else:
             if not stretch.raised and not belief.reaches_beyond(before):  # go on elsewhere, not here for ever
                 belief, cornered = belief.with_dropped(stretch.waypoints_K_m[-1]), True
-    return Sought(belief, None, lowered)
+    return Sought(belief, None, lowered, tip)
 
 
 def _follow(belief: SearchMap, hint: Contact, tip: Array) -> SearchPlan[tuple[SearchMap, Contact | None, Array]]:
@@ -163,23 +166,26 @@ def _from_its_side(belief: SearchMap, landed: MoveOutcome) -> SearchPlan[tuple[S
 
 
 def _way_in(policy: SearchPolicy, belief: SearchMap, tip_xy: Array, *, lowered: bool) -> Array | None:
-    """Return where to lower the ball: the nearest free path position from which the policy can continue.
+    """Return where to lower the ball: the nearest position from which the policy can continue.
 
-    Before the first sweep it is the current position.
+    Before the first sweep it is the current position. Then it is a free position of the path, or, if none will do, one
+    that was not visited yet: what was found encloses the path. There may be an object, which is then touched from
+    above.
     """
     half = np.asarray(belief.half_extent_m)
     inside = np.clip(tip_xy, -half, half)
     if len(belief.path_K_m) == 0:
         return None if lowered or len(belief.dropped) else inside
-    free = belief.path_K_m[~belief.inside_exclusion(belief.path_K_m)]
-    free = free[np.argsort(np.linalg.norm(free - inside, axis=1), kind="stable")]
-    tried = np.zeros((0, 2))
-    for spot in free:
-        if len(tried) and np.linalg.norm(tried - spot, axis=1).min() < ENTRY_SPACING_M:
-            continue
-        if len(belief.dropped) and np.linalg.norm(belief.dropped - spot, axis=1).min() < TAKEN_M:
-            continue
-        if policy.next_stretch(belief, spot) is not None:
-            return np.asarray(spot)
-        tried = np.vstack([tried, spot])
+    axes = (np.linspace(-h, h, 2 + round(2 * h / ENTRY_SPACING_M)) for h in half)
+    anywhere = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    for places in (belief.path_K_m, anywhere):
+        free = places[~belief.inside_exclusion(places) & ~belief.is_dropped(places)]
+        free = free[np.argsort(np.linalg.norm(free - inside, axis=1), kind="stable")]
+        tried = np.zeros((0, 2))
+        for spot in free:
+            if len(tried) and np.linalg.norm(tried - spot, axis=1).min() < ENTRY_SPACING_M:
+                continue
+            if policy.next_stretch(belief, spot) is not None:
+                return np.asarray(spot)
+            tried = np.vstack([tried, spot])
     return None

@@ -208,6 +208,7 @@ class ExpectedFind:
         near = near[
             np.isfinite(lengths[near]) & (straight[near] > 1e-3) & ~belief.inside_exclusion(lattice.nodes[near])
         ]
+        near = near[~belief.is_dropped(lattice.nodes[near])]
         if len(near) == 0:
             return None
         goals, ahead_m = lattice.nodes[near], (p.depth - 1) * p.leg_m
