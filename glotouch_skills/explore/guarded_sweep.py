@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from glotouch_bt.perception.search import SearchMap, left_in_words, policy_names, search_policy, seek
-from glotouch_bt.perception.touch import Contact
+from glotouch_bt.perception.search import SearchMap, left_in_words, policy_names, search_policy, seek_next
+from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.probe import Explorer, ExploringSpeeds
@@ -50,6 +50,9 @@ class GuardedSweepParams(SkillParams):
 class GuardedSweep(Skill):
     """Sweep by the policy until an object that is not yet traced is touched, and retreat from it.
 
+    If objects of a known number are missing and hardly a place is left, a candidate that is probably two bodies is
+    divided.
+
     SUCCESS: something was touched; `contact` is the contact, and the probe has retreated.
     """
 
@@ -69,7 +72,9 @@ class GuardedSweep(Skill):
 
     tool = In(HeldTool, "the held probe")
     previous = In(SearchMap, "what has been explored so far", key="map", required=False)
+    known = In(tuple, "candidates so far", key="candidates", element=Candidate, required=False)
     map = Out(SearchMap, "what has been explored now")
+    candidates = Out(tuple, "candidates now", element=Candidate)
     contact = Out(Contact, "the contact that ended the sweep")
     exhausted = Out(bool, "nothing is left to explore, or to reach", always=True, on_success=False)
     chance_left = Out(
@@ -81,7 +86,9 @@ class GuardedSweep(Skill):
 
     def run(self) -> SkillRun:
         """See the class."""
+        known: tuple[Candidate, ...] = self.known or ()
         self.exhausted, self.chance_left = False, float("nan")
+        self.candidates = known
         p, tool = self.params, self.tool
         speeds = ExploringSpeeds(
             sweep_m_s=p.speed_m_s, travel_m_s=p.travel_speed_m_s, height_m=p.height_m, headroom_m=p.headroom_m
@@ -89,15 +96,29 @@ class GuardedSweep(Skill):
         explorer = Explorer(self.context, tool, speeds, self.event)
         belief = self.previous or self._blank_map()
         self.chance_left = belief.chance_left
-        plan = seek(belief, search_policy(p.policy), explorer.tip_K_m, lowered=explorer.lowered)
-        sought = yield from explorer.run(plan)
+        plan = seek_next(
+            belief,
+            known,
+            search_policy(p.policy),
+            explorer.tip_K_m,
+            tool.tip_radius_m,
+            lowered=explorer.lowered,
+            round_tip=tool.round,
+        )
+        sought, self.candidates = yield from explorer.run(plan)
+        for candidate in self.candidates:
+            if not any(candidate is k for k in known):
+                self.event(
+                    "candidate", candidate=candidate, displaced_m=0.0, ended="one contour of two bodies", moves=0
+                )
         self.map, self.chance_left = sought.belief, sought.belief.chance_left
         if sought.contact is None:
             self.exhausted = True
             of = f" of {belief.expected}" if belief.expected is not None else ""
-            known = "all expected objects are traced" if sought.belief.complete else "nothing unexplored is left"
-            why = left_in_words(self.chance_left) or known
-            raise self.SEARCH_EXHAUSTED(f"{why}; {belief.found}{of} objects were found", found=belief.found)
+            end = "all expected objects are traced" if sought.belief.complete else "nothing unexplored is left"
+            why = left_in_words(self.chance_left) or end
+            found = sought.belief.found
+            raise self.SEARCH_EXHAUSTED(f"{why}; {found}{of} objects were found", found=found)
         self.contact = sought.contact
 
     def _blank_map(self) -> SearchMap:

@@ -114,7 +114,7 @@ def explore(
     try:
         while not belief.complete:
             tip_K_m, radius = world.tip_K_m, world.tip_radius_m
-            search = seek_next(belief, candidates, policy, tip_K_m, radius, orbit.exclusion_m, lowered=world.lowered)
+            search = seek_next(belief, candidates, policy, tip_K_m, radius, lowered=world.lowered)
             sought, candidates = drive(search, execute)
             maps += belief, sought.belief
             belief = sought.belief
@@ -139,8 +139,9 @@ def _updated(found: dict[int, Traced], travel_m: float, candidates: tuple[Candid
     now: dict[int, Traced] = {}
     for c in candidates:
         before = found.get(c.index)
-        changed = before is None or before.candidate is not c
-        now[c.index] = Traced(travel_m, c, () if before is None else (*before.earlier, before)) if changed else before
+        if before is None or before.candidate is not c:
+            before = Traced(travel_m, c, () if before is None else (*before.earlier, before))
+        now[c.index] = before
     return now
 
 

@@ -161,7 +161,7 @@ def _with_parts(
     return _admitted(belief, every, radius_m, whole.index, tuple(changed))
 
 
-def divided(belief: SearchMap, known: tuple[Candidate, ...], radius_m: float, exclusion_m: float) -> Admitted | None:
+def divided(belief: SearchMap, known: tuple[Candidate, ...], radius_m: float) -> Admitted | None:
     """Divide the candidate that is probably two bodies, because objects are missing; None if none probably is.
 
     With K of N objects traced, each met with probability 1 - h, the odds that K candidates are K + 1 bodies change by
@@ -170,20 +170,20 @@ def divided(belief: SearchMap, known: tuple[Candidate, ...], radius_m: float, ex
     Args:
         belief, known: Map and candidates.
         radius_m: Radius of the ball; 0 for another section, whose candidates are never divided.
-        exclusion_m: As for `admit`.
     """
     missing = 0 if belief.expected is None else belief.expected - belief.found
-    if missing <= 0 or not known:
+    margin_m = {e.index: e.given_margin_m for e in belief.exclusions}
+    cuts = {c.index: division(c.contacts, radius_m, belief.path_K_m) for c in known if c.index in margin_m}
+    if missing <= 0 or not cuts:
         return None
     hidden = max(belief.anywhere.share, UNMET)
-    cuts = {c.index: division(c.contacts, radius_m, belief.path_K_m) for c in known}
-    whole = max(known, key=lambda c: cuts[c.index][0])
+    whole = max((c for c in known if c.index in cuts), key=lambda c: cuts[c.index][0])
     gain, parts = cuts[whole.index]
     log_odds = TWO_BODIES["intercept"] + TWO_BODIES["per_nat"] * min(gain, SEPARATE_NATS)
     if log_odds + np.log(missing / (belief.found + 1) * (1.0 - hidden) / hidden) <= 0.0:
         return None
     parts = tuple(sorted(parts, key=len, reverse=True))
-    return _with_parts(belief, known, whole, parts, radius_m, exclusion_m)
+    return _with_parts(belief, known, whole, parts, radius_m, margin_m[whole.index])
 
 
 def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclusion_m: float) -> Admitted:

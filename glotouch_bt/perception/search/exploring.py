@@ -32,7 +32,6 @@ def seek_next(
     policy: SearchPolicy,
     tip_K_m: Array,
     tip_radius_m: float,
-    exclusion_m: float,
     *,
     lowered: bool,
     round_tip: bool = True,
@@ -43,7 +42,6 @@ def seek_next(
         belief, known: Map and candidates.
         policy, tip_K_m, lowered: As for `seek`.
         tip_radius_m, round_tip: As for `trace`.
-        exclusion_m: As for `admit`.
     """
     radius, enough = tip_radius_m if round_tip else 0.0, UNMET
     while True:
@@ -51,7 +49,7 @@ def seek_next(
         belief, tip_K_m, lowered = sought.belief, sought.tip_K_m, sought.lowered
         if sought.contact is not None or belief.complete:
             return sought, known
-        two = divided(belief, known, radius, exclusion_m)
+        two = divided(belief, known, radius)
         if two is not None:
             belief, known = two.belief, two.candidates
         elif enough > 0.0:

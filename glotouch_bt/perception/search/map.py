@@ -54,6 +54,11 @@ class Exclusion:
     index: int | None = None
 
     @property
+    def given_margin_m(self) -> float:
+        """The margin without what contacts outside the outline add."""
+        return self.margin_m - protrusion_m(self.contour)
+
+    @property
     def traced(self) -> bool:
         """True for a traced object."""
         return self.index is not None
@@ -140,12 +145,11 @@ class SearchMap:
         """
         if not (np.isfinite(margin_m) and margin_m >= 0):
             raise ParamError("margin_m", margin_m, "finite and not negative")
-        out = float(np.clip(np.max(contour.residuals_m, initial=0.0), 0.0, MAX_PROTRUSION_M))
         index = (
             max((e.index for e in self.exclusions if e.index is not None), default=-1) + 1 if index is None else index
         )
         others = self.without_exclusion(index).exclusions
-        return replace(self, exclusions=(*others, Exclusion(contour, margin_m + out, index)))
+        return replace(self, exclusions=(*others, Exclusion(contour, margin_m + protrusion_m(contour), index)))
 
     def without_exclusion(self, index: int) -> SearchMap:
         """Remove a traced object: it is a part of another one."""
@@ -293,6 +297,11 @@ class SearchMap:
     @cached_property
     def _tree(self) -> scipy.spatial.cKDTree:
         return scipy.spatial.cKDTree(self.path_K_m)
+
+
+def protrusion_m(contour: Contour) -> float:
+    """Return how far contacts outside an outline widen its envelope."""
+    return float(np.clip(np.max(contour.residuals_m, initial=0.0), 0.0, MAX_PROTRUSION_M))
 
 
 def _frozen(a: Array) -> Array:

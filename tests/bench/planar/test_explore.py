@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from glotouch_bt.bench.planar import ContactModel, planar_world
-from glotouch_bt.bench.planar.explore import _again, explore, refine_all
+from glotouch_bt.bench.planar.explore import Traced, _updated, explore, refine_all
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.perception.search import search_policy
 from glotouch_bt.robot.scene import load_folder
@@ -34,10 +36,13 @@ def test_two_cylinders_are_found_where_they_are(world_of: WorldOf, policy: str) 
 
 def test_a_candidate_that_is_traced_again_keeps_its_earlier_traces(world_of: WorldOf) -> None:
     explored = explore(world_of([cylinder(0.025)], [(0.05, 0.06, 0)]), search_policy("nearest_frontier"), 1)
-    candidate = explored.found[0].candidate
-    first = _again(None, 1.0, candidate)
-    third = _again(_again(first, 2.0, candidate), 3.0, candidate)
-    assert [t.travel_m for t in (*third.earlier, third)] == [1.0, 2.0, 3.0]
+    states = [replace(explored.found[0].candidate, quality=q) for q in (0.1, 0.2, 0.3)]
+    found: dict[int, Traced] = {}
+    for travel_m, candidate in zip((1.0, 2.0, 3.0), states, strict=True):
+        found = _updated(found, travel_m, (candidate,))
+    (last,) = _updated(found, 4.0, (states[-1],)).values()
+    assert [t.travel_m for t in (*last.earlier, last)] == [1.0, 2.0, 3.0]
+    assert [t.candidate for t in (*last.earlier, last)] == states
 
 
 def test_an_empty_container_is_exhausted(world_of: WorldOf) -> None:

@@ -10,8 +10,16 @@ import pytest
 
 import glotouch_bt.perception.search.bodies as search_bodies
 from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit
-from glotouch_bt.perception.search.bodies import Doubt, bodies, chance_of_fewer, distinct, doubts, outline_of
-from glotouch_bt.perception.search.candidates import quality, regroup
+from glotouch_bt.perception.search.bodies import (
+    Doubt,
+    bodies,
+    chance_of_fewer,
+    distinct,
+    division,
+    doubts,
+    outline_of,
+)
+from glotouch_bt.perception.search.candidates import divided, quality, regroup
 from glotouch_bt.perception.touch import Candidate, Contact
 
 R = 0.006
@@ -162,3 +170,42 @@ def admit_nothing(belief: SearchMap, candidates: tuple[Candidate, ...]):
     """The state after a trace that gave nothing."""
     nothing = OutlineTrace((), None, np.zeros(2), NO_PATH)
     return admit(belief, candidates, LEFT[0], nothing, 0.018, 0.01)
+
+
+def searched(expected: int, share: float = 1.0) -> SearchMap:
+    """A map of which a share is swept in narrow rows, with the contour of two discs on it."""
+    belief = SearchMap.blank((0.138, 0.188), expected)
+    y = np.arange(-0.188, -0.188 + share * 0.376, 0.02)
+    x = np.tile([-0.138, 0.138, 0.138, -0.138], len(y))[: 2 * len(y)]
+    return belief.with_path(np.column_stack([x, np.repeat(y, 2)]))
+
+
+@pytest.mark.parametrize(
+    ("expected", "share", "number"),
+    [(2, 1.0, 2), (1, 1.0, 1), (2, 0.1, 1)],
+    ids=["one is missing", "none", "unsearched"],
+)
+def test_a_missing_object_is_a_part_of_another_one_once_all_is_searched(
+    expected: int, share: float, number: int
+) -> None:
+    """The free path is no evidence here: the rows lead through the discs."""
+    whole = candidate(0, (*LEFT, *RIGHT))
+    belief = searched(expected, share).with_exclusion(whole.contour, 0.01, 0)
+    belief = replace(belief, path_K_m=belief.path_K_m[np.linalg.norm(belief.path_K_m, axis=1) > 0.075])
+    found = divided(belief, (whole,), R)
+    if number == 1:
+        assert found is None
+        return
+    assert found is not None
+    assert found.belief.found == 2
+    parts = sorted(found.candidates, key=lambda c: c.contour.centre_K_m[0])
+    assert {id(c) for c in parts[0].contacts} == {id(c) for c in LEFT}
+    assert [e.given_margin_m for e in found.belief.exclusions] == pytest.approx([0.01, 0.01])
+
+
+def test_the_gain_of_a_division_is_that_of_its_parts() -> None:
+    gain, parts = division((*LEFT, *RIGHT), R, NO_PATH)
+    alone = sum(outline_of(part, R).log_evidence for part in parts)
+    assert gain == pytest.approx(alone - outline_of((*LEFT, *RIGHT), R).log_evidence)
+    assert gain > 12.0 > division(box(0.0, 0.1, 0.044), R, NO_PATH)[0]
+    assert division(LEFT[:3], R, NO_PATH)[0] == -np.inf

@@ -240,3 +240,36 @@ def test_an_unknown_number_is_sought_until_hardly_anything_can_be_left() -> None
     strict = SearchMap.blank(HALF, expected=None, left_below=0.0)
     sought, moves = run(seek(strict, Towards((0.1, 0.18), (-0.1, 0.18)), start, lowered=True), start, free)
     assert [m.kind for m in moves[:2]] == ["sweep", "sweep"]
+
+
+def test_what_encloses_the_whole_path_is_left_by_an_unvisited_place() -> None:
+    """The first object stands in the corner where the search begins."""
+    corner = np.array([-0.13, -0.18])
+    around = Contour("round", corner, (0.08, 0.08), 0.0, 0.0, np.zeros(0))
+    belief = blank().with_path([corner, (-0.12, -0.18)]).with_exclusion(around, 0.01)
+
+    class Outside:
+        def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
+            return None if belief.inside_exclusion(tip_K_m[None])[0] else Stretch(np.array([[0.1, 0.15]]))
+
+    def answer(move: Move, tip: Array) -> MoveOutcome:
+        stop = np.array([0.06, 0.12])
+        return (
+            MoveOutcome(stop, np.array([tip, stop]), touch(stop, stop - tip))
+            if move.kind == "sweep"
+            else free(move, tip)
+        )
+
+    sought, moves = run(seek(belief, Outside(), corner, lowered=True), corner, answer)
+    assert [m.kind for m in moves] == ["hop", "sweep", "retreat"]
+    assert np.linalg.norm(moves[0].goal_K_m - corner) > 0.05
+    assert sought.contact is not None
+
+
+def test_a_search_that_is_short_of_objects_ends_when_enough_is_searched() -> None:
+    rows = np.arange(-HALF[1], HALF[1] + 0.01, 0.02)
+    path = np.column_stack([np.tile([-0.138, 0.138, 0.138, -0.138], len(rows))[: 2 * len(rows)], np.repeat(rows, 2)])
+    belief, start = blank().with_path(path), np.zeros(2)
+    sought, moves = run(seek(belief, Towards((0.1, 0.0)), start, lowered=True, enough=0.01), start, free)
+    assert (moves, sought.contact) == ([], None)
+    assert len(run(seek(belief, Towards((0.1, 0.0)), start, lowered=True), start, free)[1]) > 0
