@@ -10,9 +10,9 @@ demo: $(VENV)
 	$(BIN)/glotouch run retrieve --set target=apple --seed 0
 	@echo "next: source $(BIN)/activate, then: glotouch run calibrate --live"
 
-# Quick tests: no whole mission in MuJoCo; with BROWSER=1 also those of `test-browser`.
+# Quick tests: no whole mission in MuJoCo, no browser.
 test: $(VENV)/.compiled
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not study" --ignore=tests/integration $(if $(BROWSER),,--ignore=tests/browser)
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not study" --ignore=tests/integration --ignore=tests/browser
 
 # Whole missions, backends and conformance in MuJoCo and on simulated devices, for which some tests wait.
 test-integration: $(VENV)/.compiled
