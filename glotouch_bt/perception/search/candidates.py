@@ -171,10 +171,12 @@ def divided(belief: SearchMap, known: tuple[Candidate, ...], radius_m: float) ->
         belief, known: Map and candidates.
         radius_m: Radius of the ball; 0 for another section, whose candidates are never divided.
     """
-    missing = 0 if belief.expected is None else belief.expected - belief.found
+    if belief.expected is None or belief.found >= belief.expected:
+        return None
+    missing = belief.expected - belief.found
     margin_m = {e.index: e.given_margin_m for e in belief.exclusions}
     cuts = {c.index: division(c.contacts, radius_m, belief.path_K_m) for c in known if c.index in margin_m}
-    if missing <= 0 or not cuts:
+    if not cuts:
         return None
     hidden = max(belief.anywhere.share, UNMET)
     whole = max((c for c in known if c.index in cuts), key=lambda c: cuts[c.index][0])

@@ -1,4 +1,4 @@
-"""What the driver refuses to send to the arm."""
+"""Checks of setpoints and requests before the driver sends them to the arm."""
 
 from __future__ import annotations
 

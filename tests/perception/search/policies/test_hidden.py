@@ -36,9 +36,10 @@ def test_it_covers_the_floor_and_ends_when_no_reachable_place_would_touch_anythi
     assert 0.0 < enough_m < 7.0, "coverage of 0.11 m2 by swaths of 23 mm is 4.9 m"
 
 
-def test_a_known_number_is_searched_as_before() -> None:
-    """The search of objects of the usual size ends where small ones could still hide."""
-    belief = SearchMap.blank(HALF, expected=5).with_path(rows(0.0275))
-    assert POLICY.next_stretch(belief, belief.path_K_m[-1]) is None
+def test_the_search_ends_when_no_disc_of_the_prior_fits_between_the_rows() -> None:
+    """The smallest disc has a radius of 8.8 mm: the ball touches it from rows up to 29.6 mm apart."""
+    for expected in (5, None):
+        belief = SearchMap.blank(HALF, expected).with_path(rows(0.0275))
+        assert POLICY.next_stretch(belief, belief.path_K_m[-1]) is None
     unknown = blank().with_path(rows(0.033))
     assert POLICY.next_stretch(unknown, unknown.path_K_m[-1]) is not None
