@@ -24,7 +24,7 @@ test-studies: $(VENV)/.compiled
 
 # The pages in Chromium: needs chromium and chromium-driver (Debian's packages).
 test-browser: $(VENV)/.compiled
-	GLOTOUCH_REQUIRE_BROWSER=1 $(BIN)/python -m pytest -n 2 tests/browser
+	GLOTOUCH_REQUIRE_BROWSER=1 $(BIN)/python -m pytest tests/browser
 
 check: $(VENV)/.dev
 	$(BIN)/ruff format --check .
