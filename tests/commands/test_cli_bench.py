@@ -1,4 +1,4 @@
-"""`glotouch bench search | contact | detection`: what they start and print, and bad input; studies are mocked."""
+"""`glotouch bench search | contact | detection | retrieve`: what they start and print, and bad input; studies are mocked."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from glotouch_bt import cli
-from glotouch_bt.bench import detection
+from glotouch_bt.bench import RetrieveCampaign, detection
 from glotouch_bt.bench.contact import bench as contact
 from glotouch_bt.bench.contact.bench import METRICS, MORE, PAPER
 from glotouch_bt.bench.contact.square import TOOLS
@@ -168,3 +168,18 @@ def test_detection(as_json: bool, command: CliRunner, monkeypatch: pytest.Monkey
         assert len(json.loads(done.stdout)["seeds"]) == 100
     else:
         assert done.stdout == "nominal\n  100 trials\no/summary.json\n"
+
+
+def test_retrieve_aims_at_the_objects_of_the_given_world(command: CliRunner, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The mission's default target is not among the solids of that world."""
+    started: list[RetrieveCampaign] = []
+
+    def run(campaign: RetrieveCampaign, *_: object) -> dict[str, Any]:
+        started.append(campaign)
+        return {}
+
+    monkeypatch.setattr("glotouch_bt.bench.run_campaign", run)
+    done = command.invoke(cli.app, ["bench", "retrieve", "--world", "clutter_ten", "--out", "o", "--json"])
+    assert done.exit_code == 0, done.output
+    assert len(started[0].targets) == 10
+    assert "wukong" not in started[0].targets

@@ -34,9 +34,11 @@ def retrieve(
     from glotouch_bt.bench import RetrieveCampaign, run_campaign, succeeded, targets_of
     from glotouch_bt.commands.terminal import print_retrieve
     from glotouch_bt.mission import load_mission
+    from glotouch_bt.mission.read import load_world
     from glotouch_bt.robot import BadInput
 
-    names = tuple(target) if target else targets_of(objects) if objects else ()
+    folder = objects or (load_world(world).objects.folder if world else None)
+    names = tuple(target) if target else targets_of(folder) if folder else ()
     settings = shared.read_settings(set_)
     if "target" in settings:
         raise BadInput("--set target: use --target to choose the targets of a campaign")
