@@ -1,4 +1,4 @@
-"""`glotouch bench search | contact | detection | retrieve`: what they start and print, and bad input; studies are mocked."""
+"""`glotouch bench search | contact | detection | retrieve`: what they start and print, and bad input."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from glotouch_bt.perception.touch.outline.deviation import Hypothesis, infer_posteriors
+from glotouch_bt.perception.touch.outline.fitting import fit_both
 from glotouch_bt.perception.touch.outline.mixture import TEMPER, OutlineBelief
 from glotouch_bt.perception.touch.outline.primitives import (
     APPROACH_SD_RAD,
@@ -18,7 +19,6 @@ from glotouch_bt.perception.touch.outline.primitives import (
     NORMAL_SD_RAD,
     Touches,
     circle,
-    fit_both,
     rounded,
 )
 from glotouch_bt.robot import Array, ParamError

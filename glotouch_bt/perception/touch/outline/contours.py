@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from glotouch_bt.perception.touch.outline.belief import infer_outline
+from glotouch_bt.perception.touch.outline.fitting import fit
 from glotouch_bt.perception.touch.outline.polygons import polygon_distance
-from glotouch_bt.perception.touch.outline.primitives import CONTACT_SD_M, Touches, circle, fit, rectangle
+from glotouch_bt.perception.touch.outline.primitives import CONTACT_SD_M, Touches, circle, rectangle
 from glotouch_bt.perception.touch.values import Contour
 from glotouch_bt.robot import Array, ParamError
 

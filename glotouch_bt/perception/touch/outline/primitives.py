@@ -1,9 +1,4 @@
-"""Circle and oriented rectangle fitted to ball centres: distances, normals, derivatives, damped Gauss-Newton.
-
-The centre of a touching ball is at signed distance r from the shape, for any approach or force direction. So the OFFSET
-shape is fitted to ball centres, which is exact at corners too. The force direction adds weak evidence about the normal
-(friction turns it by 6-13 degrees), which matters with one to four contacts.
-"""
+"""Circle and oriented rectangle: distances, normals, their derivatives, rays, and the prior of the parameters."""
 
 from __future__ import annotations
 
@@ -29,18 +24,12 @@ CORNER_SD_M = 0.004
 """Prior standard deviation of a corner radius."""
 CENTRE_SD_M = 0.025
 """Prior standard deviation of the centre about the point half a typical size behind the contacts."""
-SCALE_M = 0.001
-"""Residual at which the soft-L1 loss becomes linear: contact scatter plus deviation of real objects from primitives."""
 CONTACT_SD_M = 0.00045
 """Default standard deviation of a contact: onset scatter of 0.2-0.4 mm, and deviation from a primitive."""
 NORMAL_SD_RAD = 0.20
 """Standard deviation of the outward normal about the reaction."""
 APPROACH_SD_RAD = 0.60
 """Standard deviation of the outward normal about the reversed approach, where the reaction is unknown."""
-SIFT_STEP = 4
-"""Step of the descent after which only the best starts continue."""
-SIFTED = 5
-"""Number of starts that continue."""
 FREE_SD_M = 0.001
 """Standard deviation of the penalty on an outline that covers a free position."""
 
@@ -198,120 +187,6 @@ def wrapped(angle_rad: Array) -> Array:
     return np.asarray(angle_rad + 2 * np.pi * np.floor((np.pi - angle_rad) / (2 * np.pi)))
 
 
-def fit(shape: Shape, touches: Touches, *, steps: int = 14, gain: float = 1e-2) -> tuple[Array, Array]:
-    """Minimise the soft-L1 loss from many starts; return optima (s, p) and losses (s,), best first."""
-    params = _circle_starts(touches) if shape is circle else _rectangle_starts(touches)
-    if shape is rounded:
-        params = np.concatenate([params, np.full((len(params), 1), CORNER_M)], axis=1)
-    mean, sd = prior(shape, touches)
-    params, loss = _descend(shape, clipped, clipped(params), touches, mean, sd**-2, 0, steps, gain)
-    order = np.argsort(loss, kind="stable")
-    return params[order], loss[order]
-
-
-def fit_both(touches: Touches, *, steps: int = 14, gain: float = 1e-2) -> tuple[Array, Array, Array]:
-    """Return the best circle (3,) and the rounded rectangles of `fit`, from one joint descent.
-
-    A circle is a rounded rectangle constrained to yaw 0 with half sides equal to the corner radius.
-    """
-    rounds, boxes = _circle_starts(touches), _rectangle_starts(touches)
-    n = len(rounds)
-    params = np.zeros((n + len(boxes), 6))
-    params[:n, :2], params[:n, 3:] = rounds[:, :2], rounds[:, 2:]
-    params[n:, :5], params[n:, 5] = boxes, CORNER_M
-    mean, sd = prior(rounded, touches)
-    weight = np.repeat(sd[None] ** -2, len(params), axis=0)
-    weight[:n, [2, 4, 5]] = 0.0
-
-    def tied(params: Array, points_m: Array) -> Geometry:
-        g = rounded(params, points_m)
-        g.by_params[:n, :, 2:] = (0.0, -1.0, 0.0, 0.0)
-        g.normal_by_params[:n, :, 2:] = 0.0
-        return g
-
-    def bound(params: Array) -> Array:
-        params = clipped(params)
-        params[:n, 4:] = params[:n, 3:4]
-        return params
-
-    params, loss = _descend(tied, bound, bound(params), touches, mean, weight, n, steps, gain)
-    order = n + np.argsort(loss[n:], kind="stable")
-    best = params[int(np.argmin(loss[:n]))]
-    return best[[0, 1, 3]], params[order], loss[order]
-
-
-def _descend(
-    shape: Shape,
-    bound: Callable[[Array], Array],
-    params: Array,
-    touches: Touches,
-    mean: Array,
-    weight: Array,
-    kept: int,
-    steps: int,
-    gain: float,
-) -> tuple[Array, Array]:
-    """Return parameters (s, p) and losses (s,) of local optima of the first `kept` starts and the best others.
-
-    Levenberg-Marquardt with iterated reweighting on all starts at once. It ends after two consecutive steps that gain
-    less than `gain`.
-    """
-    identity = np.eye(params.shape[1])
-    longest = np.array([0.02, 0.02, 0.3] if params.shape[1] > 3 else [0.02, 0.02])
-    damping = np.full(len(params), 1e-2)
-    loss, gradient, hessian = normal_equations(shape, params, touches, mean, weight)
-    idle = 0
-    for step in range(steps):
-        if step == SIFT_STEP and len(params) > kept + SIFTED:
-            keep = np.r_[:kept, kept + np.argsort(loss[kept:], kind="stable")[:SIFTED]]
-            params, damping, loss, gradient, hessian = (v[keep] for v in (params, damping, loss, gradient, hessian))
-            weight = weight if weight.ndim == 1 else weight[keep]
-        damped = hessian * (1.0 + damping[:, None, None] * identity) + 1e-9 * identity
-        move = np.linalg.solve(damped, gradient[..., None])[..., 0]
-        move[:, : len(longest)] = np.minimum(np.maximum(move[:, : len(longest)], -longest), longest)
-        trial = bound(params - move)
-        trial_loss, trial_gradient, trial_hessian = normal_equations(shape, trial, touches, mean, weight)
-        better = trial_loss < loss
-        gained = float(np.max((loss - trial_loss) * better))
-        params[better], loss[better] = trial[better], trial_loss[better]
-        gradient[better], hessian[better] = trial_gradient[better], trial_hessian[better]
-        damping = damping * np.where(better, 0.3, 5.0)
-        idle = idle + 1 if gained < gain else 0
-        if idle == 2:
-            break
-    return params, loss
-
-
-def normal_equations(
-    shape: Shape, params: Array, touches: Touches, mean: Array, weight: Array
-) -> tuple[Array, Array, Array]:
-    """Return loss (s,), gradient (s, p) and Gauss-Newton matrix (s, p, p) for a prior of mean (p,) and inverse
-    variance, (p,) or (s, p)."""
-    k = len(touches.tips_m)
-    g = shape(params, touches.points_m)
-    known = 1.0 / touches.normal_sd_rad
-    gap = g.distance_m - touches.radius_m
-    gap[:, k:] = np.minimum(gap[:, k:], 0.0)
-    scale = np.full(len(touches.points_m), 1.0 / SCALE_M)
-    scale[k:] = 1.0 / FREE_SD_M
-    z = np.concatenate([gap * scale, wrapped(g.normal_rad[:, :k] - touches.normal_rad) * known], axis=1)
-    root = np.sqrt(1.0 + z * z)
-    rows = np.concatenate([g.by_params * scale[:, None], g.normal_by_params[:, :k] * known[:, None]], axis=1)
-    rows[:, k : len(scale)] *= (gap[:, k:] < 0.0)[..., None]
-    off = params - mean
-    pull = off * weight
-    # This loss ranks optima and accepts steps; its data term is twice the one of the gradient.
-    loss = 2.0 * (root.sum(axis=1) - root.shape[1]) + 0.5 * (off * pull).sum(axis=1)
-    # Penalise a contact on a face whose normal points along the approach: the ball would have come from inside.
-    into = -(g.by_params[:, :k, :2] * touches.approach).sum(axis=2)
-    loss += 10.0 * (into > 0.3).sum(axis=1)
-    weighted = np.swapaxes(rows / root[..., None], 1, 2)
-    gradient = (weighted @ z[..., None])[..., 0] + pull
-    hessian = weighted @ rows
-    hessian[:, np.arange(params.shape[1]), np.arange(params.shape[1])] += weight
-    return loss, gradient, hessian
-
-
 def clipped(params: Array) -> Array:
     """Clip sizes and corner radii (s, p) to the physical limits, in place."""
     sizes = params[:, 2:3] if params.shape[1] == 3 else params[:, 3:5]
@@ -319,43 +194,3 @@ def clipped(params: Array) -> Array:
     if params.shape[1] == 6:
         params[:, 5] = np.minimum(np.maximum(params[:, 5], 0.0), 0.8 * np.minimum(params[:, 3], params[:, 4]))
     return params
-
-
-def _circle_starts(touches: Touches) -> Array:
-    """Return start circles: algebraic fit (Kasa), one about the contacts' mean, and typical ones behind them."""
-    tips, r = touches.tips_m, touches.radius_m
-    mean = tips.mean(axis=0)
-    q = tips - mean
-    spread = float(np.sqrt(np.mean(np.sum(q * q, axis=1)))) + 1e-6
-    matrix = np.column_stack([2 * q, np.ones(len(q))])
-    solution = np.linalg.lstsq(matrix, np.sum(q * q, axis=1), rcond=1e-4)[0]
-    offset = solution[:2] * min(1.0, 0.5 * MAX_SIZE_M / (float(np.linalg.norm(solution[:2])) + 1e-9))
-    radius = float(np.sqrt(max(solution[2] + solution[:2] @ solution[:2], 1e-8)))
-    starts = [[*(mean + offset), radius - r], [*mean, spread - r]]
-    return np.array(starts + [[*middle, 0.5 * TYPICAL_M] for middle in _middles(touches)])
-
-
-def _rectangle_starts(touches: Touches) -> Array:
-    """Return start boxes: around the contacts at twelve yaws over a quarter turn, and typical ones behind them."""
-    tips, r = touches.tips_m, touches.radius_m
-    starts = []
-    for yaw in np.arange(12) * (np.pi / 24) if len(tips) > 2 else ():
-        c, s = np.cos(yaw), np.sin(yaw)
-        rotation = np.array([[c, s], [-s, c]])
-        local = tips @ rotation.T
-        low, high = local.min(axis=0), local.max(axis=0)
-        starts.append([*(0.5 * (low + high) @ rotation), yaw, *(0.5 * (high - low) - r)])
-    for middle in _middles(touches):
-        push = middle - tips.mean(axis=0)
-        yaw = float(np.arctan2(push[1], push[0]))
-        starts += [[*middle, yaw + t, 0.5 * TYPICAL_M, 0.5 * TYPICAL_M] for t in (-0.5, 0.0, 0.5, np.pi / 4)]
-    return np.array(starts)
-
-
-def _middles(touches: Touches) -> list[Array]:
-    """Return possible centres; without normals and approaches, one on each side of collinear contacts."""
-    if bool(np.isfinite(touches.normal_sd_rad).any()):
-        return [touches.prior_centre_m]
-    mean = touches.tips_m.mean(axis=0)
-    across = np.linalg.svd(touches.tips_m - mean, full_matrices=True)[2][1]
-    return [mean + 0.5 * TYPICAL_M * across, mean - 0.5 * TYPICAL_M * across]

@@ -1,20 +1,7 @@
 import numpy as np
 import pytest
 
-from glotouch_bt.perception.touch.outline.primitives import (
-    FREE_SD_M,
-    SCALE_M,
-    Touches,
-    circle,
-    fit,
-    fit_both,
-    normal_equations,
-    prior,
-    ray_m,
-    rectangle,
-    rounded,
-    wrapped,
-)
+from glotouch_bt.perception.touch.outline.primitives import circle, ray_m, rectangle, rounded, wrapped
 
 R = 0.006
 
@@ -64,53 +51,3 @@ def test_distance_of_rounded_corners():
     outside = rectangle(q, points).distance_m[0] > 0
     want = rectangle(q, points).distance_m[0] - 0.005
     np.testing.assert_allclose(rounded(p, points).distance_m[0][outside], want[outside], atol=1e-12)
-
-
-def touched(p, shape, rng, k=9):
-    """Contacts all round a shape, their normals, and free places outside."""
-    bearing = rng.uniform(0, 2 * np.pi) + np.linspace(0, 2 * np.pi, k, endpoint=False)
-    u = np.c_[np.cos(bearing), np.sin(bearing)]
-    tips = p[:2] + ray_m(p[None], R, p[:2], u)[0, :, None] * u + rng.normal(0, 3e-4, (k, 2))
-    normal = shape(p[None], tips).normal_rad[0] + rng.normal(0, 0.1, k)
-    return Touches(tips, normal, np.full(k, 0.2), -u, p[:2] + 1.3 * (tips - p[:2]), R)
-
-
-def soft_l1(p, shape, touches):
-    """The soft-L1 loss whose gradient is followed, term by term, from distances and normals alone."""
-    mean, sd = prior(shape, touches)
-    k = len(touches.tips_m)
-    g = shape(p[None], np.vstack([touches.tips_m, touches.free_m]))
-    gap = g.distance_m[0] - R
-    turn = (g.normal_rad[0, :k] - touches.normal_rad + np.pi) % (2 * np.pi) - np.pi
-    z = np.r_[gap[:k] / SCALE_M, np.minimum(gap[k:], 0) / FREE_SD_M, turn / touches.normal_sd_rad]
-    return np.sum(np.sqrt(1 + z * z) - 1) + 0.5 * np.sum(((p - mean) / sd) ** 2)
-
-
-@pytest.mark.parametrize("shape", [circle, rounded])
-def test_gradient_matches_finite_differences_of_the_loss(shape):
-    rng = np.random.default_rng(3)
-    for _ in range(10):
-        p = random_params(shape, rng)
-        touches = touched(p, shape, rng)
-        mean, sd = prior(shape, touches)
-        q = p + rng.normal(0, 0.001, len(p))
-        _, gradient, _ = normal_equations(shape, q[None], touches, mean, sd**-2)
-        step = 1e-8 * np.eye(len(p))
-        by = [(soft_l1(q + d, shape, touches) - soft_l1(q - d, shape, touches)) / 2e-8 for d in step]
-        # at the loss's own scale: a contact in the last nanometre before a corner begins is on two faces
-        assert np.median(np.abs(gradient[0] - by)) < 1e-3 * np.abs(by).max() + 1e-3
-
-
-@pytest.mark.parametrize("shape", [circle, rounded])
-def test_joint_descent_is_as_good_as_separate_fits(shape):
-    rng = np.random.default_rng(4)
-    for _ in range(6):
-        p = random_params(shape, rng)
-        touches = touched(p, shape, rng)
-        alone, loss = fit(shape, touches)
-        ring, boxes, losses = fit_both(touches)
-        if shape is circle:
-            np.testing.assert_allclose(ring, alone[0], atol=1e-4)
-        else:
-            assert losses[0] <= loss[0] + 1e-9
-            assert np.linalg.norm(boxes[0][:2] - p[:2]) < 2e-3
