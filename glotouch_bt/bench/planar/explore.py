@@ -27,6 +27,9 @@ from glotouch_bt.perception.search import (
 from glotouch_bt.perception.touch import Candidate
 
 BUDGET_M = 8.0
+"""Travel at which an exploration of five objects on `FLOOR_M2` stops; a mission has no limit. Source: ours."""
+FLOOR_M2 = 0.30 * 0.40
+"""Floor of the world container_five."""
 MAX_MOVES = 5000
 """Limit on moves. Refused moves cost no travel, so the travel budget alone would not end an exploration."""
 
@@ -65,16 +68,22 @@ class Explored:
         return sum(len(t.candidate.contacts) for t in self.found)
 
 
+def travel_budget_m(world: PlanarWorld) -> float:
+    """Return the travel at which an exploration stops: in proportion to the objects or the floor, whichever is more."""
+    x_m, y_m = 2 * (world.half_m + world.tip_radius_m)
+    return BUDGET_M * max(float(x_m * y_m) / FLOOR_M2, len(world.sections) / 5)
+
+
 class _OutOfBudget(Exception):
     """The travel budget is spent."""
 
 
-def _limited(world: PlanarWorld, budget_m: float) -> Callable[[Move], MoveOutcome]:
+def _limited(world: PlanarWorld, budget_m: float | None) -> Callable[[Move], MoveOutcome]:
     """Return the world's `execute`, which raises once the travel budget is spent."""
-    moves = count()
+    moves, limit_m = count(), travel_budget_m(world) if budget_m is None else budget_m
 
     def execute(move: Move) -> MoveOutcome:
-        if world.travel_m >= budget_m or next(moves) >= MAX_MOVES:
+        if world.travel_m >= limit_m or next(moves) >= MAX_MOVES:
             raise _OutOfBudget
         return world.execute(move)
 
@@ -92,7 +101,7 @@ def explore(
     policy: SearchPolicy,
     expected: int | None,
     *,
-    budget_m: float = BUDGET_M,
+    budget_m: float | None = None,
     left_below: float = LEFT_BELOW,
 ) -> Explored:
     """Run the mission's exploration on geometry alone.
@@ -101,7 +110,7 @@ def explore(
         world: The layout; its travel meter must be at 0.
         policy: Search policy.
         expected: Number of objects to find; None: unknown.
-        budget_m: Travel at which it stops.
+        budget_m: Travel at which it stops; None: see `travel_budget_m`.
         left_below: With an unknown number, the chance that something is left below which it stops.
     """
     sweep, orbit = _defaults("guarded_sweep"), _defaults("orbit_probe")
@@ -145,7 +154,7 @@ def _updated(found: dict[int, Traced], travel_m: float, candidates: tuple[Candid
     return now
 
 
-def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDGET_M) -> tuple[Traced, ...]:
+def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float | None = None) -> tuple[Traced, ...]:
     """Refine the candidates of an exploration; return all of them in their order.
 
     The least certain candidate comes first. Candidates beyond the travel budget stay unchanged.
@@ -153,7 +162,7 @@ def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float = BUDG
     Args:
         world: The world after the exploration.
         explored: Result of the exploration.
-        budget_m: Travel at which it stops, the exploration included.
+        budget_m: Travel at which it stops, the exploration included; None: see `travel_budget_m`.
     """
     tracing, half = _defaults("refine_outline").rule(), explored.belief.half_extent_m
     out, execute = list(explored.found), _limited(world, budget_m)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from glotouch_bt.bench.planar.explore import BUDGET_M, explore
+from glotouch_bt.bench.planar.explore import explore
 from glotouch_bt.bench.planar.layout import planar_world
 from glotouch_bt.bench.statistics import bootstrap_mean
 from glotouch_bt.campaign import Campaign, OnRow, Row, crashed, run_trials, silent, write_summary, write_table
@@ -83,7 +83,7 @@ def growth_row(campaign: GrowthCampaign, objects: int, area: float, seed: int) -
     meshes = load_folder(world.objects.folder, world.objects.names)
     wide, some = scaled_scene(world, meshes, objects, area)
     policy = TimedPolicy(search_policy(campaign.policy, seed))
-    explored = explore(planar_world(wide, some, seed), policy, objects, budget_m=BUDGET_M * max(area, objects / 5))
+    explored = explore(planar_world(wide, some, seed), policy, objects)
     return {
         "objects": objects, "area": area, "seed": seed, "ended": explored.ended, "found": len(explored.found),
         "travel_m": round(explored.travel_m, 6), "contacts": explored.contacts, "planning_s": sum(policy.plans_s),

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from glotouch_bt.bench.planar import BUDGET_M
 from glotouch_bt.bench.search.plots import plot_discovered, plot_layout
 from glotouch_bt.bench.search.scoring import discovered_at
 from glotouch_bt.bench.search.summary import COMPLETE_AT_M, MEAN_AT_M, summarise
@@ -57,14 +56,14 @@ class SearchCampaign(Campaign):
         policies: Names of search policies; candidate errors are reported for the first.
         planar_seeds: Seeds of further layouts for the planar simulator alone.
         recorded: Folders searched for recorded runs, which are scored too.
-        planar_budget_m: Travel at which planar explorations stop.
+        planar_budget_m: Travel at which planar explorations stop; None: in proportion to the objects and the floor.
     """
 
     mission: str = "survey"
     policies: tuple[str, ...]
     planar_seeds: tuple[int, ...] = ()
     recorded: tuple[Path, ...] = ()
-    planar_budget_m: float = BUDGET_M
+    planar_budget_m: float | None = None
 
     def __post_init__(self) -> None:
         known = policy_names()

@@ -55,12 +55,16 @@ def summarise(rows: Sequence[Row], policies: Sequence[str], objects: int) -> dic
 
 
 def discovery(rows: Sequence[Row], objects: int) -> dict[str, Any]:
-    """Return mean discoveries and completion rate at each travel budget; an aborted trial counts up to its end."""
+    """Return mean discoveries and completion rate at each travel, and the share of objects found in the end.
+
+    An aborted trial counts up to its end.
+    """
     n = len(rows)
     ends = [r["discovered_m"][objects - 1] for r in rows if len(r["discovered_m"]) >= objects]
     return {
         "mean_discovered": {f"{d:g}": bootstrap_mean([discovered_at(r, d) for r in rows]) for d in MEAN_AT_M},
         "complete": {f"{d:g}": wilson(sum(discovered_at(r, d) >= objects for r in rows), n) for d in COMPLETE_AT_M},
+        "found_share": bootstrap_mean([len(r["discovered_m"]) / objects for r in rows]),
         "travel_to_complete_m": quantiles(ends),
         "false_candidates": bootstrap_mean([r["false_candidates"] for r in rows]),
         "contacts": bootstrap_mean([r["contacts"] for r in rows]),

@@ -248,7 +248,7 @@ def _travelled(places: Array) -> Array:
     return out
 
 
-def planar_trial(head: Row, mission: str, objects: Path | None, other_world: str | None, budget_m: float) -> Row:
+def planar_trial(head: Row, mission: str, objects: Path | None, other_world: str | None, budget_m: float | None) -> Row:
     """Run an exploration in the planar simulator; `head` are the first columns of the row."""
     policy, seed = head["policy"], head["seed"]
     world, meshes = scene(mission, objects, other_world)

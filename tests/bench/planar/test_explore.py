@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.bench.planar import ContactModel, planar_world
-from glotouch_bt.bench.planar.explore import Traced, _updated, explore, refine_all
+from glotouch_bt.bench.planar.explore import Traced, _updated, explore, refine_all, travel_budget_m
 from glotouch_bt.mission.load import load_mission
 from glotouch_bt.perception.search import search_policy
 from glotouch_bt.robot.scene import load_folder
@@ -55,6 +55,19 @@ def test_the_budget_ends_it(world_of: WorldOf) -> None:
     explored = explore(world, search_policy("random_descent"), 5, budget_m=0.5)
     assert explored.ended == "budget"
     assert 0.5 <= explored.travel_m < 1.0
+
+
+@pytest.mark.parametrize(
+    ("interior_m", "objects", "budget_m"),
+    [((0.3, 0.4), 5, 8.0), ((0.3, 0.4), 1, 8.0), ((0.6, 0.8), 5, 32.0), ((0.4, 0.55), 10, 16.0)],
+)
+def test_the_budget_grows_with_the_objects_or_the_floor(
+    interior_m: tuple[float, float], objects: int, budget_m: float
+) -> None:
+    world = replace(load_mission("survey").world)
+    wide = replace(world, container=replace(world.container, interior_m=(*interior_m, 0.08)))
+    planar = planar_world(wide, load_folder(world.objects.folder)[:1] * objects, 0)
+    assert travel_budget_m(planar) == pytest.approx(budget_m)
 
 
 def test_the_layout_of_a_seed_is_that_of_the_backends() -> None:

@@ -97,6 +97,7 @@ def test_a_trial_that_broke_off_counts_as_far_as_it_came():
     assert figures["mean_discovered"]["3"]["mean"] == pytest.approx(1.0)
     assert figures["complete"]["3"]["rate"] == pytest.approx(1 / 3)
     assert figures["complete"]["3"]["n"] == 3
+    assert figures["found_share"]["mean"] == pytest.approx(0.5)
     assert figures["ended"] == {"complete": 1, "safety_stop": 1, "traceback": 1}
 
 
