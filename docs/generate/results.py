@@ -23,6 +23,14 @@ All figures are measured in simulation. Nothing here has been measured on a real
 Wilson 95 % interval in per cent, a mean with its bootstrap 95 % interval. Each table names its command, commit,
 conditions and seeds. **Older code** marks a figure whose code has changed since; it stays until the command is run
 again. [Run a benchmark](guides/benchmarks.md) says how to renew a figure.
+
+| words | meaning |
+|---|---|
+| layout | one random arrangement of the objects, drawn from one seed |
+| looked at once | nobody had seen results on these seeds before, and nothing was tuned on them |
+| in doubt | the mission ended because no candidate was sure enough |
+| row Top-1 | share of decisions in which the best candidate for a given STL is the right object |
+| true peak | largest force in the simulation, which may be above the sensed one |
 """
 
 

@@ -22,9 +22,11 @@ def faults(
     from glotouch_bt.commands.terminal import print_table
     from glotouch_bt.faults import CATALOGUE
     from glotouch_bt.mission.read import shipped
-    from glotouch_bt.robot import UnknownName
+    from glotouch_bt.robot import BadInput, UnknownName
 
     if name is not None and name not in CATALOGUE:
+        if name in shipped("faults"):
+            raise BadInput(f"{name!r} is a fault plan; run it with --faults {name}")
         raise UnknownName("fault", name, CATALOGUE)
     kinds = [CATALOGUE[name]] if name else list(CATALOGUE.values())
     if json_:

@@ -9,6 +9,9 @@ import typer
 
 from glotouch_bt.commands.shared import Json, guarded, print_json
 
+KINDS = {"subtrees": "subtree", "worlds": "world", "conditions": "profile of conditions", "faults": "fault plan"}
+"""Folders of shipped files that are no missions, and what a file in them is called."""
+
 
 @guarded
 def missions(
@@ -21,10 +24,13 @@ def missions(
     from glotouch_bt.commands.terminal import print_settings, print_table
     from glotouch_bt.mission.export import describe_mission
     from glotouch_bt.mission.read import shipped
-    from glotouch_bt.robot import UnknownName
+    from glotouch_bt.robot import BadInput, UnknownName
 
     known = shipped("")
     if name is not None and name not in known:
+        for kind in KINDS:
+            if name in shipped(kind):
+                raise BadInput(f"{name!r} is a shipped {KINDS[kind]}, not a mission; its file is {shipped(kind)[name]}")
         raise UnknownName("mission", name, known)
     described = [describe_mission(known[n]) for n in ([name] if name else known)]
     if json_:
@@ -33,7 +39,7 @@ def missions(
     if name is None:
         rows = [(d["name"], d["description"], ", ".join(p["name"] for p in d["parameters"])) for d in described]
         print_table("missions", ("name", "description", "parameters (--set NAME=VALUE)"), rows)
-        for kind in ("subtrees", "worlds", "conditions", "faults"):
+        for kind in KINDS:
             sys.stdout.write(f"{'fault plans' if kind == 'faults' else kind}: {', '.join(shipped(kind))}\n")
         return
     (d,) = described

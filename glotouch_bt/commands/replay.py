@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from glotouch_bt.commands.shared import Json, RunFolderArgument, guarded, print_json
+from glotouch_bt.commands.shared import Json, RunFolderArgument, check_run, guarded, print_json
 
 MAX_DIFFERENCES = 12
 """Number of differences to print."""
@@ -40,6 +40,7 @@ def replay(
     from glotouch_bt.runs.replay import as_dict, as_lines, decision_as_dict, replay_decisions
     from glotouch_bt.runs.replay import replay as run_replay
 
+    check_run(folder)
     if decisions:
         made = replay_decisions(folder, objects=objects)
         if json_:

@@ -16,6 +16,7 @@ from glotouch_bt.commands.shared import (
     NoBrowser,
     Port,
     RunFolderArgument,
+    check_run,
     guarded,
     print_json,
     read_settings,
@@ -44,6 +45,7 @@ def report(
     from glotouch_bt.robot import GlotouchError
     from glotouch_bt.runs import write_film
 
+    check_run(folder)
     if film:
         try:
             write_film(folder, objects, read_settings(set_))
@@ -69,6 +71,8 @@ def view(
     A run under way is followed. Only this machine can open the page. Ctrl-C ends it. Nothing is written.
     """
     from glotouch_bt.view import view_run
+
+    check_run(folder)
 
     def ready(address: str) -> None:
         sys.stdout.write(f"{address}   (Ctrl-C ends the page)\n")

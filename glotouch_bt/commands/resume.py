@@ -16,6 +16,7 @@ from glotouch_bt.commands.shared import (
     NoBrowser,
     Objects,
     Port,
+    check_run,
     guarded,
     live_page,
     live_tree,
@@ -53,6 +54,7 @@ def resume(
     from glotouch_bt.runs import Operator, ResumableRun, operated
     from glotouch_bt.runs import resume as resume_run
 
+    check_run(folder)
     if list_:
         _list(folder, json_)
         return 0

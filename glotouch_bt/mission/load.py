@@ -290,7 +290,7 @@ def _world(
     near = path.parent if node is source.get("world") else Path()  # of the command line: beside the working folder
     found = _find_world(node.value, (near, shipped_root()))
     if found is None:
-        names = [f"worlds/{p.name}" for p in sorted((shipped_root() / "worlds").glob("*.yaml"))]
+        names = [p.stem for p in sorted((shipped_root() / "worlds").glob("*.yaml"))]
         findings.unknown(node.place, "unknown_world", "world", node.value, names)
         return None, None
     try:

@@ -28,11 +28,13 @@ def write_report(run_dir: Path, objects: Path | None = None) -> Path:
         The file written.
 
     Raises:
-        BadInput: There is no record, or the folder cannot be written or holds links.
+        BadInput: There is no record, or nothing in it, or the folder cannot be written or holds links.
     """
     require_plain(run_dir, (REPORT_NAME, f".{REPORT_NAME}.part"))
     target = run_dir / REPORT_NAME
     record = read_run(run_dir)
+    if not record.run:
+        raise BadInput(f"{record.path}: is empty or cut off in its first bytes; there is nothing to report")
     record.objects = objects
     text = render(record)
     try:

@@ -98,7 +98,7 @@ CASES = [
     ("run tiny.yaml", "do not fit into the container: no place found for 'a'"),
     ("run negative.yaml", "negative_world.yaml:4:15: container.interior_m = -0.4: must be finite and positive"),
     ("run flat.yaml", "flat_world.yaml:4:15: "),
-    ("run world.yaml", "world.yaml:2:8: unknown world 'container_fve'; did you mean 'worlds/container_five.yaml'?"),
+    ("run world.yaml", "world.yaml:2:8: unknown world 'container_fve'; did you mean 'container_five'?"),
     # YAML
     ("run anchor.yaml", "anchor.yaml:4:5: anchors (&again) are not allowed"),
     ("run bomb.yaml", "bomb.yaml:2:4: anchors (&a) are not allowed"),

@@ -40,8 +40,8 @@ Method = Callable[[Target, Sequence[TouchSet]], Ranking]
 DEFAULT = "likelihood"
 TOUCHED = "touched"
 """The same matcher, with the target known by touch only instead of by its STL."""
-ACCEPTED = 0.9
-"""Probability from which an outside matcher's best candidate counts as accepted. Source: the mission `retrieve`."""
+ACCEPTED = LikelihoodParams().accept
+"""Probability from which an outside matcher's best candidate counts as accepted: as with the skill `match`."""
 PAPER_TOP1: Mapping[str, float] = {"paper_width": 0.683, "paper_depth": 0.783, "paper_full": 0.900}
 """Row Top-1 of the paper's ablation, on its own objects and robot."""
 

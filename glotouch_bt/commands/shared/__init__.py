@@ -35,6 +35,7 @@ from glotouch_bt.commands.shared.options import (
     changed_conditions,
     check_names,
     check_parameters,
+    check_run,
     read_settings,
     read_shard,
     with_bare_values,

@@ -132,6 +132,22 @@ def check_parameters(mission: Mission, needed: Iterable[str]) -> None:
         )
 
 
+def check_run(folder: Path) -> None:
+    """Require that a folder holds a run.
+
+    Raises:
+        BadInput: It does not; the newest run below ./runs is named.
+    """
+    from glotouch_bt.robot import BadInput
+
+    if folder.is_file():
+        raise BadInput(f"{folder}: give the run's folder, not a file in it")
+    if not any((folder / name).exists() for name in ("run.mcap", "checkpoint.sqlite")):
+        runs = sorted(Path("runs").glob("*/run.mcap"), key=lambda file: file.stat().st_mtime)
+        newest = f" (newest here: {runs[-1].parent})" if runs else ""
+        raise BadInput(f"{folder}: no run here; give the folder that `glotouch run` printed{newest}")
+
+
 def bench_folder(out: Path | None, name: str) -> Path:
     """Return the experiment's folder, after a check that it can be written; leave nothing there.
 

@@ -44,46 +44,59 @@ class _Section(BaseModel):
 class PoseSection(_Section):
     """A planar pose: an origin and a rotation about z."""
 
-    position_m: Vec3 = Field(description="origin in B")
-    yaw_deg: float = Field(default=0.0, description="rotation about z_B")
+    position_m: Vec3 = Field(description="origin in B: [x, y, z], m")
+    yaw_deg: float = Field(default=0.0, description="rotation about z_B, deg")
 
 
 class ContainerSection(_Section):
     """The open box; see `robot.Container`."""
 
-    pose_B_K: PoseSection
-    interior_m: Vec3
-    wall_m: float = Container.wall_m
+    pose_B_K: PoseSection = Field(description="centre of the floor, and the direction of x_K")
+    interior_m: Vec3 = Field(description="inside of the box along x_K, y_K and up, m")
+    wall_m: float = Field(default=Container.wall_m, description="thickness of the walls, m")
 
 
 class ProbeSection(_Section):
     """The passive probe; see `robot.Probe`."""
 
-    tip_radius_m: float = Probe.tip_radius_m
-    shaft_diameter_m: float = Probe.shaft_diameter_m
-    length_m: float = Probe.length_m
-    handle_m: Vec3 = Probe.handle_m
-    mass_kg: float = Probe.mass_kg
-    com_below_grasp_m: float = Probe.com_below_grasp_m
+    tip_radius_m: float = Field(default=Probe.tip_radius_m, description="radius of the ball, m")
+    shaft_diameter_m: float = Field(default=Probe.shaft_diameter_m, description="thickness of the shaft, m")
+    length_m: float = Field(
+        default=Probe.length_m, description="from the handle's lower face to the lowest point of the ball, m"
+    )
+    handle_m: Vec3 = Field(
+        default=Probe.handle_m, description="sides of the handle, m; the jaws close along the second"
+    )
+    mass_kg: float = Field(default=Probe.mass_kg, description="mass, kg")
+    com_below_grasp_m: float = Field(
+        default=Probe.com_below_grasp_m, description="centre of mass below the handle's centre, m"
+    )
 
 
 class HolderSection(_Section):
     """The place of the stowed probe; the grasp pose points down. See `robot.Holder`."""
 
-    pose_B_grasp: PoseSection
-    half_m: Vec3 = Holder.half_m
+    pose_B_grasp: PoseSection = Field(description="centre of the stowed probe's handle")
+    half_m: Vec3 = Field(default=Holder.half_m, description="half extents of the holder's block, m")
 
 
 class ObjectsSection(_Section):
     """The STL files of the objects in the container; see `robot.ObjectSet`."""
 
     folder: str = Field(description="folder of STL files, relative to the world's file")
-    names: tuple[str, ...] = ()
+    names: tuple[str, ...] = Field(default=(), description="only these files of the folder; empty: all of them")
     expected: int | None = Field(
         default=None, ge=1, le=20, description="required number of objects, in the folder or in names"
     )
-    min_gap_m: float = Field(default=ObjectSet.min_gap_m, ge=0, le=1.0)
-    min_wall_gap_m: float = Field(default=ObjectSet.min_wall_gap_m, ge=0, le=1.0)
+    min_gap_m: float = Field(
+        default=ObjectSet.min_gap_m,
+        ge=0,
+        le=1.0,
+        description="smallest gap between two objects of a simulated layout, m",
+    )
+    min_wall_gap_m: float = Field(
+        default=ObjectSet.min_wall_gap_m, ge=0, le=1.0, description="smallest gap between an object and a wall, m"
+    )
     touching_share: float = Field(
         default=ObjectSet.touching_share,
         ge=0,

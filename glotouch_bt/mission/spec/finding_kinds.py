@@ -50,7 +50,11 @@ _KINDS = (
     _Error("unknown_world", "the world file does not exist"),
     _Error("unusable_world", "the world file cannot be read"),
     _Error("no_objects", "the folder of objects has no STL file", advice=_CONVERT),
-    _Error("no_such_stl", "no object of this name exists"),
+    _Error(
+        "no_such_stl",
+        "no object of this name exists",
+        advice="choose one of the valid names, for example with --set target=NAME",
+    ),
     _Error(
         "not_remembered",
         "a target `touched:NAME` was never remembered, or its file is damaged",
@@ -133,7 +137,7 @@ _KINDS = (
     _Error(
         "wrong_state",
         "the skill may start while a resource is in the wrong state",
-        "the skill would move with something else in the hand than it expects",
+        "the skill relies on this state: it would act on wrong readings, or with something else in the hand",
     ),
     _Error(
         "wrong_end",

@@ -158,5 +158,5 @@ class MissionFaults(BadInput):
     """
 
     def __init__(self, findings: list[Finding], warnings: Sequence[Finding] = ()) -> None:
-        super().__init__("\n".join(str(f) for f in findings))
+        super().__init__("\n".join(f"{f}; {f.kind.advice}" if f.kind.advice else str(f) for f in findings))
         self.findings, self.warnings = findings, list(warnings)

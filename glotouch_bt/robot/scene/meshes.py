@@ -186,7 +186,7 @@ def solid_of(path: Path, data: bytes) -> Mesh:
     return Mesh(path.stem, vertices, faces, digest)
 
 
-UNREADABLE = "is not a readable STL file; export it again as a binary STL in metres"
+UNREADABLE = "is not a readable STL file; export it again as a binary STL"
 
 
 def bounded_stl(path: Path, data: bytes) -> bytes:

@@ -69,7 +69,7 @@ MISTAKES: list[tuple[str, str, list[tuple[int, int, str, str]]]] = [
     ("two names in one node", HEAD + "tree:\n  - find:\n    act:\n", [(5, 5, "not_a_node", "indentation")]),
     ("a number is no node", HEAD + "tree:\n  - 7\n", [(4, 5, "not_a_node", "a node is expected here")]),
     ("skill with a list", HEAD + "tree:\n  find: [1]\n", [(4, 9, "wrong_type", "must be a mapping")]),
-    ("unknown world", "mission: m\nworld: worlds/containr_five.yaml\ntree: find\n", [(2, 8, "unknown_world", "did you mean 'worlds/container_five.yaml'")]),
+    ("unknown world", "mission: m\nworld: worlds/containr_five.yaml\ntree: find\n", [(2, 8, "unknown_world", "did you mean 'container_five'")]),
     ("unknown key", HEAD + "tre: find\ntree: find\n", [(3, 1, "unknown_key", "did you mean 'tree'")]),
     ("no tree", HEAD, [(1, 1, "missing_key", "'tree'")]),
     ("no world", "mission: m\ntree: find\n", [(1, 1, "missing_key", "'world'")]),
