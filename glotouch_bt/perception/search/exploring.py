@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 
+from glotouch_bt.perception.search.belonging import joins, of_another, part_of
 from glotouch_bt.perception.search.candidates import (
     UNMET,
     Admitted,
     admit,
     divided,
-    joins,
-    of_another,
-    part_of,
     regroup,
 )
 from glotouch_bt.perception.search.map import SearchMap
