@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import chain, count
+from itertools import chain, combinations, count
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from glotouch_bt.perception.search.bodies import (
     division,
     doubts,
     outline_of,
+    redivided,
     same_body,
 )
 from glotouch_bt.perception.search.map import SearchMap
@@ -46,6 +47,9 @@ TWO_BODIES = {"intercept": -3.9, "per_nat": 0.29}
 """Log odds that a candidate is two bodies, before their number is considered, and what each nat gained by its best
 division adds. Source: the counts of `SEPARATE_NATS`, and 21 layouts in which objects were missed (planar, seeds
 61844-61892 of touching_five)."""
+OVERLAP_M = 0.008
+"""Depth of the overlap of two outlines from which on their contacts are divided anew. Source: ours; outlines are
+known to a few millimetres."""
 UNMET = 0.01
 """Probability that an object was not met although the path touched its place. Source: ours."""
 
@@ -187,13 +191,65 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
         belief, changed = belief.without_exclusion(part), tuple(i for i in changed if i != part)
         del every[part]
         parts = (split_at_motion(parts[0], radius, likely=len(one.contacts))[1],)
+    return _shared_out(
+        replace(admitted, belief=belief, changed=changed), every, (one, other), parts, radius, exclusion_m
+    )
+
+
+def separated(admitted: Admitted, radius_m: float, exclusion_m: float) -> Admitted:
+    """Divide the contacts of candidates anew whose outlines overlap, the deepest overlap first: bodies do not overlap.
+
+    Args:
+        admitted: Map and candidates.
+        radius_m: Radius of the ball; 0 for another section, whose candidates are left as they are.
+        exclusion_m: Margin around the objects that the search avoids.
+    """
+    tried: list[tuple[Candidate, Candidate]] = []
+    while radius_m > 0.0:
+        pairs = (p for p in combinations(admitted.candidates, 2) if not any(p[0] is a and p[1] is b for a, b in tried))
+        deepest = max(((_overlap_m(*p), p) for p in pairs), key=lambda found: found[0], default=None)
+        if deepest is None or deepest[0] < OVERLAP_M:
+            break
+        one, other = deepest[1]
+        tried.append((one, other))
+        parts = redivided(one.contacts, other.contacts, radius_m, admitted.belief.path_K_m)
+        if parts:
+            every = {c.index: c for c in admitted.candidates}
+            changed = tuple(dict.fromkeys((*admitted.changed, one.index, other.index)))
+            now = _shared_out(replace(admitted, changed=changed), every, (one, other), parts, radius_m, exclusion_m)
+            admitted = replace(now, index=admitted.index)
+            tried.append((every[one.index], every[other.index]))
+    return admitted
+
+
+def _overlap_m(a: Candidate, b: Candidate) -> float:
+    """Return how deep the outline of one candidate reaches into the other's; negative if they are apart."""
+    pairs = ((a.contour, b.contour), (b.contour, a.contour))
+    return -min(float(signed_distance(one, other.outline_K_m()).min()) for one, other in pairs)
+
+
+def _shared_out(
+    admitted: Admitted,
+    every: dict[int, Candidate],
+    pair: tuple[Candidate, Candidate],
+    parts: tuple[tuple[Contact, ...], ...],
+    radius_m: float,
+    exclusion_m: float,
+) -> Admitted:
+    """Return the result with new contacts of two candidates, and further candidates if there are more parts.
+
+    The part with most contacts of the first candidate is its own.
+    """
+    one, other = pair
+    belief, changed = admitted.belief, admitted.changed
     mine = {id(c) for c in one.contacts}
     parts = tuple(sorted(parts, key=lambda body: -sum(id(c) in mine for c in body)))
-    for index, body in zip(chain((whole, part), count(_next_index(belief, admitted.candidates))), parts, strict=False):
-        every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius))
+    indices = chain((one.index, other.index), count(_next_index(belief, admitted.candidates)))
+    for index, body in zip(indices, parts, strict=False):
+        every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius_m))
         belief = belief.with_exclusion(_occupied(every[index]), exclusion_m, index)
         changed = tuple(dict.fromkeys((*changed, index)))
-    return _admitted(belief, every, radius, whole, changed)
+    return _admitted(belief, every, radius_m, one.index, changed)
 
 
 def _occupied(candidate: Candidate) -> Contour:
