@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import chain, count
+from itertools import chain, combinations, count
 
 import numpy as np
 
+from glotouch_bt.perception.search.belonging import MAX_LENGTH_M, is_fully_traced, is_over, overlaps
 from glotouch_bt.perception.search.bodies import (
     KNOWN_QUALITY,
     SEPARATE_NATS,
@@ -17,15 +18,15 @@ from glotouch_bt.perception.search.bodies import (
     division,
     doubts,
     outline_of,
+    redivided,
     same_body,
 )
-from glotouch_bt.perception.search.map import FACING, SearchMap
-from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams
+from glotouch_bt.perception.search.map import SearchMap
+from glotouch_bt.perception.search.tracing import OutlineTrace
 from glotouch_bt.perception.touch import (
     Candidate,
     Contact,
     Contour,
-    contour_quality,
     signed_distance,
     split_at_motion,
 )
@@ -35,41 +36,20 @@ from glotouch_bt.perception.touch.outline import (
     convex_hull,
     envelope,
     minimum_rectangle,
-    polygon_distance,
 )
 from glotouch_bt.robot import Array, ParamError
 
 MIN_CONTACTS = 3
 """Minimum number of contacts of a candidate's outline."""
-SAME_M = 0.010
-"""Maximum distance from a candidate's envelope at which a contact belongs to it; objects stand farther apart."""
-BETWEEN_M = 0.018
-"""Maximum distance from the hull of the contacts of a half-traced candidate at which a contact belongs to it. Source:
-objects stand 30 mm apart and are pushed by a few millimetres."""
-PART_M = 0.030
-"""Maximum distance from a candidate's envelope at which a contact is tested for belonging to it."""
-OTHER_OBJECT_ODDS = 0.02
-"""Prior odds that a contact near a candidate belongs to another object."""
-FLAT_M = 1e-4
-"""Width across their line below which contacts count as collinear."""
-WELL_TRACED_QUALITY = 0.5
-"""Minimum `contour_quality` of a candidate that is traced on all sides."""
-FULLY_TRACED_QUALITY = 0.75
-"""Minimum `quality` of a candidate that is traced on all sides; the centre's standard deviation is then below 3 mm.
-Source: ours."""
-PROTRUSION_M = 0.012
-"""Maximum distance, from the envelope of a fully traced candidate, of a contact with a part that protrudes from it.
-Source: ours; the ball's diameter."""
-ON_M = 0.004
-"""Maximum distance from such a candidate's envelope at which a contact belongs to it."""
 HALF_QUALITY_SD_M = 0.005
 """Standard deviation of the centre at quality 1/2."""
-MAX_LENGTH_M = 0.125
-"""Maximum length of a candidate after a merge."""
 TWO_BODIES = {"intercept": -3.9, "per_nat": 0.29}
 """Log odds that a candidate is two bodies, before their number is considered, and what each nat gained by its best
 division adds. Source: the counts of `SEPARATE_NATS`, and 21 layouts in which objects were missed (planar, seeds
 61844-61892 of touching_five)."""
+OVERLAP_M = 0.008
+"""Depth of the overlap of two outlines from which on their contacts are divided anew. Source: ours; outlines are
+known to a few millimetres."""
 UNMET = 0.01
 """Probability that an object was not met although the path touched its place. Source: ours."""
 
@@ -211,13 +191,65 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
         belief, changed = belief.without_exclusion(part), tuple(i for i in changed if i != part)
         del every[part]
         parts = (split_at_motion(parts[0], radius, likely=len(one.contacts))[1],)
+    return _shared_out(
+        replace(admitted, belief=belief, changed=changed), every, (one, other), parts, radius, exclusion_m
+    )
+
+
+def separated(admitted: Admitted, radius_m: float, exclusion_m: float) -> Admitted:
+    """Divide the contacts of candidates anew whose outlines overlap, the deepest overlap first: bodies do not overlap.
+
+    Args:
+        admitted: Map and candidates.
+        radius_m: Radius of the ball; 0 for another section, whose candidates are left as they are.
+        exclusion_m: Margin around the objects that the search avoids.
+    """
+    tried: list[tuple[Candidate, Candidate]] = []
+    while radius_m > 0.0:
+        pairs = (p for p in combinations(admitted.candidates, 2) if not any(p[0] is a and p[1] is b for a, b in tried))
+        deepest = max(((_overlap_m(*p), p) for p in pairs), key=lambda found: found[0], default=None)
+        if deepest is None or deepest[0] < OVERLAP_M:
+            break
+        one, other = deepest[1]
+        tried.append((one, other))
+        parts = redivided(one.contacts, other.contacts, radius_m, admitted.belief.path_K_m)
+        if parts:
+            every = {c.index: c for c in admitted.candidates}
+            changed = tuple(dict.fromkeys((*admitted.changed, one.index, other.index)))
+            now = _shared_out(replace(admitted, changed=changed), every, (one, other), parts, radius_m, exclusion_m)
+            admitted = replace(now, index=admitted.index)
+            tried.append((every[one.index], every[other.index]))
+    return admitted
+
+
+def _overlap_m(a: Candidate, b: Candidate) -> float:
+    """Return how deep the outline of one candidate reaches into the other's; negative if they are apart."""
+    pairs = ((a.contour, b.contour), (b.contour, a.contour))
+    return -min(float(signed_distance(one, other.outline_K_m()).min()) for one, other in pairs)
+
+
+def _shared_out(
+    admitted: Admitted,
+    every: dict[int, Candidate],
+    pair: tuple[Candidate, Candidate],
+    parts: tuple[tuple[Contact, ...], ...],
+    radius_m: float,
+    exclusion_m: float,
+) -> Admitted:
+    """Return the result with new contacts of two candidates, and further candidates if there are more parts.
+
+    The part with most contacts of the first candidate is its own.
+    """
+    one, other = pair
+    belief, changed = admitted.belief, admitted.changed
     mine = {id(c) for c in one.contacts}
     parts = tuple(sorted(parts, key=lambda body: -sum(id(c) in mine for c in body)))
-    for index, body in zip(chain((whole, part), count(_next_index(belief, admitted.candidates))), parts, strict=False):
-        every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius))
+    indices = chain((one.index, other.index), count(_next_index(belief, admitted.candidates)))
+    for index, body in zip(indices, parts, strict=False):
+        every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius_m))
         belief = belief.with_exclusion(_occupied(every[index]), exclusion_m, index)
         changed = tuple(dict.fromkeys((*changed, index)))
-    return _admitted(belief, every, radius, whole, changed)
+    return _admitted(belief, every, radius_m, one.index, changed)
 
 
 def _occupied(candidate: Candidate) -> Contour:
@@ -283,66 +315,6 @@ def _with(candidate: Candidate, contacts: tuple[Contact, ...], outline: OutlineB
     return replace(candidate, contour=outline.contour, contacts=contacts, quality=quality(outline))
 
 
-def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Candidate | None:
-    """Return the candidate of a new contact: by distance, or if one object explains both better than two; else None."""
-    for old in sorted(known, key=lambda c: float(signed_distance(envelope(c), first.point_K_m[None])[0])):
-        if float(signed_distance(envelope(old), first.point_K_m[None])[0]) > PART_M:
-            return None
-        off = first.tip_K_m[:2] - old.contour.centre_K_m
-        if float(first.reaction_K[:2] @ off) < FACING * float(np.hypot(off[0], off[1])):
-            continue
-        if _overlaps(old, first.point_K_m[None]):
-            return old
-        one = outline_of((*old.contacts, first), radius_m)
-        two = outline_of(old.contacts, radius_m).log_evidence + outline_of((first,), radius_m).log_evidence
-        if one.log_evidence > two + np.log(OTHER_OBJECT_ODDS) and max(one.contour.size_m) <= TraceParams().largest_m:
-            return old
-    return None
-
-
-def joins(known: tuple[Candidate, ...], contacts: tuple[Contact, ...], radius_m: float) -> bool:
-    """Return True if the contacts of a trace under way belong to an existing candidate."""
-    points = np.array([c.point_K_m for c in contacts])
-    near = (old for old in known if _overlaps(old, points))
-    return any(max(outline_of((*old.contacts, *contacts), radius_m).contour.size_m) <= MAX_LENGTH_M for old in near)
-
-
-def of_another(known: tuple[Candidate, ...], radius_m: float, contacts: tuple[Contact, ...], contact: Contact) -> bool:
-    """Return True if a new contact of a trace belongs to another candidate, which is near and explains it better.
-
-    A candidate with an uncertain centre does not count: it may be a part of the traced object.
-
-    Args:
-        known: The other candidates.
-        radius_m: Radius of the ball; 0 for another section.
-        contacts: Contacts of the trace.
-        contact: The new one.
-    """
-
-    def gain(of: tuple[Contact, ...]) -> float:
-        return outline_of((*of, contact), radius_m).log_evidence - outline_of(of, radius_m).log_evidence
-
-    return any(
-        c.quality >= KNOWN_QUALITY
-        and float(signed_distance(envelope(c), contact.point_K_m[None])[0]) < PART_M
-        and gain(c.contacts) - gain(contacts) > SEPARATE_NATS
-        for c in known
-    )
-
-
-def _is_well_traced(candidate: Candidate) -> bool:
-    tips = np.array([c.tip_K_m[:2] for c in candidate.contacts])
-    return contour_quality(tips, candidate.contour) >= WELL_TRACED_QUALITY
-
-
-def _is_fully_traced(candidate: Candidate) -> bool:
-    """Return True if the outline is known on all sides, so that what lies outside it is something else.
-
-    The end of something long has contacts on all sides, too, but its centre is uncertain.
-    """
-    return candidate.quality >= FULLY_TRACED_QUALITY and _is_well_traced(candidate)
-
-
 def _merged(
     old: Candidate, traced: OutlineTrace, radius_m: float, height_m: float, path_K_m: Array
 ) -> Candidate | None:
@@ -351,7 +323,7 @@ def _merged(
     Contacts that one body explains best if it moved are those after the motion. The union may still be several bodies.
     """
     points = np.array([c.point_K_m for c in traced.contacts])
-    if not _overlaps(old, points) and not (_is_fully_traced(old) and _is_over(old, traced)):
+    if not overlaps(old, points) and not (is_fully_traced(old) and is_over(old, traced)):
         return None
     shift = np.array([*traced.displaced_K_m, 0.0])
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)
@@ -365,32 +337,3 @@ def _merged(
         if float(signed_distance(envelope(old), middle)[0]) > 0.0:
             return None
     return _with(replace(old, height_m=max(old.height_m, height_m)), contacts, outline)
-
-
-def _overlaps(old: Candidate, points: Array) -> bool:
-    """Return True if contact points (n, 2) are near enough to a candidate to be the same object."""
-    outside_m = signed_distance(envelope(old), points)
-    if _is_fully_traced(old):
-        return float(np.median(outside_m)) <= ON_M
-    return float(outside_m.min()) <= SAME_M or _apart_m(old.contacts, points) <= BETWEEN_M
-
-
-def _is_over(old: Candidate, traced: OutlineTrace) -> bool:
-    """Return True if a whole trace lies over or close to a candidate: it was pushed, or a part protrudes from it.
-
-    A trace round a neighbour has contacts on its far side.
-    """
-    points = np.array([c.point_K_m for c in traced.contacts])
-    if float(signed_distance(envelope(old), points).max()) <= PROTRUSION_M:
-        return True
-    if traced.outline is None:
-        return False
-    return float(signed_distance(envelope(old), traced.outline.contour.centre_K_m[None])[0]) <= 0.0
-
-
-def _apart_m(contacts: tuple[Contact, ...], points: Array) -> float:
-    """Return the distance of points (n, 2) from the hull of the contact points; not positive if one is inside."""
-    hull = np.array([c.point_K_m for c in contacts])
-    if np.linalg.svd(hull - hull.mean(axis=0))[1][1] > FLAT_M:
-        return float(polygon_distance(convex_hull(hull), points).min())
-    return float(np.linalg.norm(points[:, None] - hull[None], axis=2).min())

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from functools import partial
 
+from glotouch_bt.perception.search.belonging import joins, of_another, part_of
 from glotouch_bt.perception.search.candidates import (
     UNMET,
     Admitted,
     admit,
     divided,
-    joins,
-    of_another,
-    part_of,
     regroup,
+    separated,
 )
 from glotouch_bt.perception.search.map import SearchMap
 from glotouch_bt.perception.search.moves import SearchPlan
@@ -115,7 +114,7 @@ def trace_bodies(
             elsewhere=elsewhere(rest),
         )
         admitted = regroup(admitted, whole.index, part.index, more, exclusion_m)
-    return admitted, traced
+    return separated(admitted, radius, exclusion_m) if _all_traced(admitted) else admitted, traced
 
 
 def _next_check(admitted: Admitted, checked: set[int]) -> tuple[Candidate, Candidate] | None:
@@ -123,7 +122,7 @@ def _next_check(admitted: Admitted, checked: set[int]) -> tuple[Candidate, Candi
 
     The parts of one contour are checked at once, all others before the search ends by count.
     """
-    ends = admitted.belief.expected is not None and admitted.belief.found >= admitted.belief.expected
+    ends = _all_traced(admitted)
     best: tuple[Candidate, Candidate] | None = None
     for pair in (doubt.pair for doubt in admitted.doubts):
         indices = {c.index for c in pair}
@@ -133,3 +132,8 @@ def _next_check(admitted: Admitted, checked: set[int]) -> tuple[Candidate, Candi
         if len(part.contacts) < CHECKED_CONTACTS and (best is None or part.quality < best[1].quality):
             best = whole, part
     return best
+
+
+def _all_traced(admitted: Admitted) -> bool:
+    """Return True if as many candidates are traced as a known number of objects."""
+    return admitted.belief.expected is not None and admitted.belief.found >= admitted.belief.expected

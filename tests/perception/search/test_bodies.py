@@ -18,8 +18,9 @@ from glotouch_bt.perception.search.bodies import (
     division,
     doubts,
     outline_of,
+    redivided,
 )
-from glotouch_bt.perception.search.candidates import divided, quality, regroup
+from glotouch_bt.perception.search.candidates import divided, quality, regroup, separated
 from glotouch_bt.perception.touch import Candidate, Contact
 
 R = 0.006
@@ -209,3 +210,34 @@ def test_the_gain_of_a_division_is_that_of_its_parts() -> None:
     assert gain == pytest.approx(alone - outline_of((*LEFT, *RIGHT), R).log_evidence)
     assert gain > 12.0 > division(box(0.0, 0.1, 0.044), R, NO_PATH)[0]
     assert division(LEFT[:3], R, NO_PATH)[0] == -np.inf
+
+
+MIXED = (*LEFT[:3], *RIGHT[3:]), (*LEFT[3:], *RIGHT[:3])
+"""The contacts of the two discs that touch, each divided among both candidates."""
+
+
+def test_contacts_mixed_between_two_bodies_are_divided_anew() -> None:
+    found = redivided(*MIXED, R, NO_PATH)
+    assert {frozenset(id(c) for c in part) for part in found} == {
+        frozenset(id(c) for c in part) for part in (LEFT, RIGHT)
+    }
+    assert not redivided(LEFT, RIGHT, R, NO_PATH), "the line between the discs is found already"
+    assert not redivided(LEFT[::2], LEFT[1::2], R, NO_PATH), "all are of one body"
+
+
+def test_candidates_that_overlap_become_the_bodies_that_do_not() -> None:
+    """The indices stay, and so does a candidate that overlaps none."""
+    far = candidate(2, disc(0.1, 0.1, 0.03, (0, 60, 120, 180, 240, 300)))
+    mixed = tuple(candidate(i, c) for i, c in enumerate(MIXED))
+    belief = SearchMap.blank((0.2, 0.15), expected=3)
+    for c in (*mixed, far):
+        belief = belief.with_exclusion(c.contour, 0.01, c.index)
+    before = admit_nothing(belief, (*mixed, far))
+    before = replace(before, index=0, changed=(0,))
+    after = separated(before, R, 0.01)
+    assert (after.index, set(after.changed), [c.index for c in after.candidates]) == (0, {0, 1}, [0, 1, 2])
+    centres = sorted(tuple(c.contour.centre_K_m) for c in after.candidates[:2])
+    np.testing.assert_allclose(centres, [[-0.03, 0.0], [0.02, 0.0]], atol=3e-3)
+    assert after.candidates[2] is far
+    assert after.belief.found == 3
+    assert separated(before, 0.0, 0.01) is before, "contacts of fingers are too far off"
