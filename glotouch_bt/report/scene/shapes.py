@@ -90,11 +90,6 @@ def joint_poses(description: RobotDescription, q: Array) -> list[Pose]:
     return poses
 
 
-def hand_pose(description: RobotDescription) -> Pose:
-    """Return the flange frame E in the frame of the last joint."""
-    return description.pose_last_E
-
-
 def finger_shift_m(aperture_m: float, side: float) -> tuple[float, float, float]:
     """Return the position of a finger's frame in P: the left finger (side 1) is at +y_P, the right one (-1) at -y_P."""
     return (0.0, side * 0.5 * aperture_m, 0.0)

@@ -7,28 +7,6 @@ from dataclasses import dataclass, fields
 
 from glotouch_bt.errors import ParamError
 
-GUARDS = {
-    "not_finite": "a reading is not finite (single samples are dropped)",
-    "stamps": "a sample is not later than the one before it (single samples are dropped)",
-    "samples_missing": "a control period repeatedly has less than a quarter of its samples",
-    "overrun": "control periods pass without a command while the arm moves: too many at once, or too often",
-    "joint_range": "a joint is measured outside its range",
-    "joint_speed": "a joint is measured faster than its limit",
-    "out_of_reach": "a pose beyond the reach of any arm, or a quaternion that is not of unit length",
-    "wrench": "consecutive samples of the wrench are beyond the limit at which the robot stops",
-    "wrench_stuck": "some or all components of a noisy wrench sensor stand still",
-    "wrench_silent": "the wrist does not feel the inertia of the moving hand",
-    "wrench_noise": "the force jumps from sample to sample (only recorded)",
-    "following": "the hand is not where it was told to be, or will not be soon",
-    "gripper_stale": "the gripper stopped reporting",
-    "tactile_stale": "requested depth maps do not arrive",
-    "tactile_frozen": "noisy depth maps repeat",
-    "tactile_dead": "depth maps with hardly a live taxel, or with infinities, arrive repeatedly",
-    "command": "a setpoint or a jaw target is not finite, out of range, or a jump",
-    "device": "the device or its driver failed",
-}
-"""Condition that trips each guard, by name."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class SupervisionLimits:
@@ -117,7 +95,7 @@ class GuardFinding:
     """One finding of a guard.
 
     Attributes:
-        guard: A key of `GUARDS`.
+        guard: Its name; docs/explanation/supervision.md lists them.
         what: One clause with units and the valid range.
         value: The offending value.
         limit: What it passed.
