@@ -51,9 +51,9 @@ class LookAlike:
     closures: int | None
 
 
-def look_alikes(models: Sequence[TargetModel], p: LikelihoodParams | None = None) -> list[LookAlike]:
+def look_alikes(models: Sequence[TargetModel]) -> list[LookAlike]:
     """Return the look-alikes among objects with different names."""
-    p = p or LikelihoodParams()
+    p = LikelihoodParams()
     found: list[LookAlike] = []
     needed = math.log(CONFIDENCE / (1 - CONFIDENCE))
     for a, b in combinations(models, 2):
