@@ -85,7 +85,7 @@ class RunProgress:
             line = (
                 f"t = {robot_s:6.1f} s  {node:<14} contacts {summary.contacts:3d}  objects {len(summary.candidates):2d}"
             )
-            self._console.print(line + _best(summary), markup=False, highlight=False, soft_wrap=True)
+            self._console.plain(line + _best(summary))
 
     def _lines(self, robot_s: float, wall_s: float, summary: RunSummary) -> Group:
         """Return the lines of a terminal."""
