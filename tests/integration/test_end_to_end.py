@@ -35,7 +35,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory):
 
 
 def check_result(done: RunResult) -> dict:
-    """result.json as DESIGN 7 has it: keys, types, finite numbers, sound in itself and alike on disk."""
+    """result.json: keys, types, finite numbers, sound in itself and alike on disk."""
     result = json.loads((done.folder / "result.json").read_text())
     assert result == json.loads(json.dumps(done.result))
     for key, kind in SCHEMA.items():

@@ -35,7 +35,8 @@ class SupervisionLimits:
             servo's lag, doubled.
         command_slack: Commanded over allowed speed. Source: ours, rounding and the end of a profile.
         gripper_age_s, tactile_age_s: Oldest gripper report, longest wait for a requested depth map. Source:
-            `Limits.max_age_s`; five times the slowest gripper of CONDITIONS, twice its slowest depth maps.
+            `Limits.max_age_s`; over six times the slowest gripper and twice the slowest depth maps of
+            conditions/harsh.yaml.
         stuck_s: Duration of bit-identical wrench samples. Source: ours, a third of the shortest rest at which a probing
             skill averages the force (120 ms).
         noisy_s: A sensor counts as noisy after this time in which the force went up and down in every period by more
@@ -45,9 +46,9 @@ class SupervisionLimits:
         silent_share: Least share of that sum. Source: ours; a delay of 0.05 s leaves a tenth, one of 0.1 s nothing.
         noise_N: A smaller change between two periods is not noise. Source: ours, a fiftieth of the sensors' resolution.
         max_noise_N, noise_over_s: Mean jump of a force component from sample to sample, over this time. Source: three
-            times that of harsh CONDITIONS (noise of 0.15 N sd jumps by 0.17 N).
-        live_taxels: Smallest share of a pad that delivers numbers. Source: harsh CONDITIONS have 3 % dead taxels; half
-            of a pad cannot be matched.
+            times that of conditions/harsh.yaml (noise of 0.15 N sd jumps by 0.17 N).
+        live_taxels: Smallest share of a pad that delivers numbers. Source: conditions/harsh.yaml has 3 % dead
+            taxels; half of a pad cannot be matched.
         late_periods: Longest wait of a moving arm, and most missing samples within `window_s`, in periods. Source: the
             watchdog's 0.25 s. The device meanwhile holds (the driver after 30 ms) and enforces the hard limit.
         held_periods: Wait after which the device has held by itself. Source: the driver's 30 ms. Shorter waits are only
