@@ -108,7 +108,7 @@ class GuardTripped(BackendError):
     """A guard below the tree tripped and holds the arm.
 
     Args:
-        guard: A key of `supervision.limits.GUARDS`.
+        guard: Its name; docs/explanation/supervision.md lists them.
         what: One clause with units and the valid range.
         value: The offending value.
         limit: What it passed.

@@ -96,7 +96,7 @@ def test_class_names_are_unique() -> None:
 
 
 def test_standard_words_are_used() -> None:
-    """`max_` and `min_`, as everywhere else; `formerly` names the old word of a parameter."""
-    pattern = re.compile(r"(?<!formerly=\")\b_?(?:most|least|MOST|LEAST)_(?!common\b|squares\b)\w+")
+    """`max_` and `min_`, as everywhere else."""
+    pattern = re.compile(r"\b_?(?:most|least|MOST|LEAST)_(?!common\b|squares\b)\w+")
     used = {str(r): sorted(set(found)) for p, r in FILES.items() if (found := pattern.findall(p.read_text()))}
     assert used == {}

@@ -9,7 +9,6 @@ from glotouch_bt.campaign.identity import (
     changes,
     code_versions,
     described_code,
-    described_request,
     digest,
     folder_digests,
     plain,

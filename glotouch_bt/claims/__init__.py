@@ -2,4 +2,4 @@
 
 from glotouch_bt.claims.collect import collect
 from glotouch_bt.claims.run import ClaimEnd, finished, run_claims
-from glotouch_bt.claims.table import Claim, chosen, made_by, read_claims, scaled
+from glotouch_bt.claims.table import Claim, chosen, read_claims, scaled

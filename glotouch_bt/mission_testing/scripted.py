@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, cast
 
@@ -18,7 +18,7 @@ from glotouch_bt.mission_testing.casting import ScriptError
 from glotouch_bt.mission_testing.leaf import STAGE, Part, Stage, playing
 from glotouch_bt.mission_testing.outcomes import Script
 from glotouch_bt.mission_testing.skipping import PATIENT, SkippingRobot, may_skip
-from glotouch_bt.robot import Command, FakeRobot, GlotouchError, Observation, Robot, World
+from glotouch_bt.robot import Command, FakeRobot, GlotouchError, Observation, Robot
 
 if TYPE_CHECKING:
     from glotouch_bt.motion import Arm
@@ -167,17 +167,15 @@ def run_scripted(
     *,
     robot: Robot | None = None,
     timeout_s: float | None = None,
-    make_arm: Callable[[Robot, World], Arm] | None = None,
     max_ticks: int = MAX_TICKS,
 ) -> ScriptedRun:
-    """Run a mission with scripted leaves; leaves without a pattern succeed at once.
+    """Run a mission with scripted leaves; leaves without a pattern succeed at once. Only a `real()` leaf has an arm.
 
     Args:
         mission: A checked mission.
         script: Outcomes by node name, skill name, path, or pattern of those.
         robot: An open robot (default: a FakeRobot whose clock skips waiting).
         timeout_s: Longest duration on the robot's clock (default: the mission's).
-        make_arm: Makes the motion generators (default: none; the real ones if a leaf is `real()`).
         max_ticks: Number of ticks after which the mission is aborted with `RunsAway`.
 
     Raises:
@@ -190,9 +188,8 @@ def run_scripted(
     if robot is None:
         robot = _robot(mission.spec, end_s, stage, all(p is not None for p in parts.values()))
     stage.begin_s = robot.observe().now_s
-    if make_arm is None:
-        moving = any(p is None for p in parts.values())
-        make_arm = default_arm if moving else lambda robot, world: cast("Arm", StillArm())
+    moving = any(p is None for p in parts.values())
+    make_arm = default_arm if moving else lambda robot, world: cast("Arm", StillArm())
     supervision = PATIENT if isinstance(robot, SkippingRobot) else None
     heard = _Heard(dict.fromkeys(paths, "INVALID"), max_ticks)
     scripted = replace(mission, spec=_played(mission.spec, stage.parts))

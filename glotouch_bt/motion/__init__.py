@@ -6,8 +6,8 @@ from glotouch_bt.motion.hand_pose import hand_pose_B, yaw_near_home
 from glotouch_bt.motion.jaws import JawRestDetector
 from glotouch_bt.motion.kinematics import Kinematics
 from glotouch_bt.motion.paths import Arc, Line, Polyline
-from glotouch_bt.motion.pause_signal import PauseSignal, Style
-from glotouch_bt.motion.plan import MotionPlan, plan_piece
+from glotouch_bt.motion.pause_signal import PauseSignal
+from glotouch_bt.motion.plan import plan_piece
 from glotouch_bt.motion.shapes import finger_outline_half_m
 from glotouch_bt.motion.timing import Paces, ProfileLimits, rest_to_rest
 from glotouch_bt.motion.tool_memory import FREE_M_S, FeltSpace

@@ -80,11 +80,12 @@ class Scene:
     Args:
         kinematics: The arm.
         world: Nominal container, probe and holder.
-        margin_m: Required clearance of every pair that may not touch.
     """
 
-    def __init__(self, kinematics: Kinematics, world: World, *, margin_m: float = 0.002) -> None:
-        self.margin_m = margin_m
+    margin_m = 0.002
+    """Required clearance of every pair that may not touch."""
+
+    def __init__(self, kinematics: Kinematics, world: World) -> None:
         self._kinematics = kinematics
         self._world = world
         self._request = fcl.DistanceRequest(enable_nearest_points=False, enable_signed_distance=True)
@@ -238,33 +239,33 @@ class Scene:
 
     def violations(self, q: Array, aperture_m: float, margin_m: float | None = None) -> list[ClearanceViolation]:
         """Return every pair with too little clearance at `q` (dof,) rad, with the jaws at `aperture_m`."""
+        margin_m = self.margin_m if margin_m is None else margin_m
         return list(self._violations(np.asarray(q, dtype=np.float64)[None], aperture_m, margin_m))
 
-    def first_violation(self, q: Array, aperture_m: float, margin_m: float | None = None) -> ClearanceViolation | None:
+    def first_violation(self, q: Array, aperture_m: float) -> ClearanceViolation | None:
         """Return the first clearance violation along postures (n, dof) rad, or None.
 
         A pair below the margin at the first posture may stay or part, but not come nearer. So a part can retract from a
         contact.
         """
-        return next(self._violations(q, aperture_m, margin_m), None)
+        return next(self._violations(q, aperture_m, self.margin_m), None)
 
-    def _violations(self, q: Array, aperture_m: float, margin_m: float | None) -> Iterator[ClearanceViolation]:
+    def _violations(self, q: Array, aperture_m: float, margin_m: float) -> Iterator[ClearanceViolation]:
         """Yield the violations of `first_violation`, all of them in the order of the postures."""
-        margin = self.margin_m if margin_m is None else margin_m
         parts = [*self._arm_parts, *(self._tool_parts if self._holding else ())]
         obstacles = list(self._obstacles.values())
         rotations, centres = self._placed(parts, q, aperture_m)
         half = np.abs(rotations) @ np.stack([p.half_m for p in parts])[None, :, :, None]
         gap = np.abs(centres[:, :, None] - np.stack([o.centre_m for o in obstacles]))
         gap -= half[:, :, None, :, 0] + np.stack([o.half_m for o in obstacles])
-        near = (gap < margin).all(axis=3)
+        near = (gap < margin_m).all(axis=3)
         near &= ~np.array([[(p.name, o.name) in self._allowed for o in obstacles] for p in parts], dtype=bool)
         at_start: dict[tuple[int, int], float] = {}
         for n, i, k in np.argwhere(near).tolist():
             body = parts[i].body
             body.setTransform(fcl.Transform(rotations[n, i], centres[n, i]))
             distance = fcl.distance(body, obstacles[k].body, self._request, fcl.DistanceResult())
-            if distance >= margin:
+            if distance >= margin_m:
                 continue
             if len(q) > 1:
                 if n == 0:
@@ -272,7 +273,7 @@ class Scene:
                     continue
                 if distance >= at_start.get((i, k), np.inf) - _LEAVING_M:
                     continue
-            yield ClearanceViolation(n, parts[i].name, obstacles[k].name, float(distance), margin)
+            yield ClearanceViolation(n, parts[i].name, obstacles[k].name, float(distance), margin_m)
 
     def _placed(self, parts: list[MovingPart], q: Array, aperture_m: float) -> tuple[Array, Array]:
         links = [self._kinematics.link_placements(row) for row in q]

@@ -43,27 +43,24 @@ class LookAlike:
 
     Attributes:
         first, second: Their names.
-        outline_nats: Log odds of one against the other after outline and height.
         closures: Closures that tell them apart; None if more than `MAX_CLOSURES`.
     """
 
     first: str
     second: str
-    outline_nats: float
     closures: int | None
 
 
-def look_alikes(models: Sequence[TargetModel], p: LikelihoodParams | None = None) -> list[LookAlike]:
+def look_alikes(models: Sequence[TargetModel]) -> list[LookAlike]:
     """Return the look-alikes among objects with different names."""
-    p = p or LikelihoodParams()
+    p = LikelihoodParams()
     found: list[LookAlike] = []
     needed = math.log(CONFIDENCE / (1 - CONFIDENCE))
     for a, b in combinations(models, 2):
-        outline = min(_outline_nats(a, b, p), _outline_nats(b, a, p))
-        if outline < needed:
+        if min(_outline_nats(a, b, p), _outline_nats(b, a, p)) < needed:
             weight = min(_weight_of_closure(a, b, p), _weight_of_closure(b, a, p))
             closures = needed / max(weight, 1e-9)
-            found.append(LookAlike(a.name, b.name, outline, None if closures > MAX_CLOSURES else math.ceil(closures)))
+            found.append(LookAlike(a.name, b.name, None if closures > MAX_CLOSURES else math.ceil(closures)))
     return found
 
 

@@ -18,7 +18,6 @@ def param(
     *,
     unit: str = "",
     names: str = "",
-    formerly: str = "",
     needs: str = "",
     default: Any = ...,
     **rules: Any,
@@ -30,10 +29,8 @@ def param(
         unit: Its unit; empty: none.
         names: "stl" if its text is the path of an STL file, or the name of one in the world's folder.
         needs: Optional part of a `robot.Gripper` without which the parameter must stay false, by its name there.
-        formerly: Its old name; a file that uses it still loads, with a warning.
         default: Its default; none: it is required.
         rules: Rules of pydantic (ge, le, gt, ...).
     """
-    extra: dict[str, Any] = {"unit": unit, "names": names} | ({"formerly": formerly} if formerly else {})
-    extra |= {"needs": needs} if needs else {}
+    extra: dict[str, Any] = {"unit": unit, "names": names} | ({"needs": needs} if needs else {})
     return Field(default, description=description, json_schema_extra=extra, **rules)

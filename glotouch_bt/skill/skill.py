@@ -13,7 +13,7 @@
 
         def run(self) -> SkillRun:
             observation = yield HOLD                    # one yield = one control period
-            result = yield from self.context.arm.guarded_line(...)
+            result = yield from self.context.arm.line(pose, speed, guard=...)
             if result.stop is None:
                 raise self.NO_TOUCH(f"no touch in {self.params.travel_m} m")
             self.contact = ...

@@ -33,9 +33,8 @@ def view_run(
     objects: Path | None = None,
     groot2: int | None = None,
     on_ready: Callable[[str], None] | None = None,
-    over: threading.Event | None = None,
 ) -> None:
-    """Serve the page of a run, which may be under way, until `over` is set or KeyboardInterrupt.
+    """Serve the page of a run, which may be under way, until KeyboardInterrupt.
 
     Args:
         folder: The run's folder.
@@ -44,7 +43,6 @@ def view_run(
         objects: Folder of STL files for the true objects of a simulation.
         groot2: Port on which Groot2 is served the tree at the time that the page shows; None: none.
         on_ready: Called with the page's address.
-        over: Ends the view.
 
     Raises:
         BadInput: There is no run, it cannot be read, the port is in use, or viser is not installed.
@@ -67,7 +65,7 @@ def view_run(
             stack.enter_context(published(groot2, MissionState(folder, tree, lambda: watch.player.t_s)))
         if on_ready is not None:
             on_ready(shown)
-        watch.run(over or threading.Event())
+        watch.run(threading.Event())
 
 
 @contextmanager

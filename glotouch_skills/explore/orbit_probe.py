@@ -26,10 +26,7 @@ class OrbitProbeParams(TracingParams):
     radial_sd_m: float = param(
         "... and the outline's, in every direction, below this", unit="m", default=0.0225, gt=0.0, le=0.03
     )
-    min_contacts: int = param(
-        "Fewest contacts, whatever the covariance says", default=4, ge=3, le=60, formerly="least_contacts"
-    )
-    max_contacts: int = param("Most contacts", default=9, ge=3, le=60, formerly="most_contacts")
+    max_contacts: int = param("Most contacts", default=9, ge=3, le=60)
     exclusion_m: float = param("Margin round a traced object that the search keeps out of", unit="m", default=0.010,
                                ge=0.0, le=0.05)  # fmt: skip
 

@@ -15,8 +15,8 @@ from glotouch_skills.common.planning import Push, PushPlanner, after_push
 from glotouch_skills.make_space.push_guard import STABLE, TOUCHING_N, Felt, PushGuard, push_guard, standing_force_B_N
 
 MIN_FELT_N = 0.08
-"""Least mean resistance of an object that slides with the fingers. The lightest of CONDITIONS (40 g, friction 0.45)
-resists with 0.18 N; the mean over half a second has 0.01 N of noise."""
+"""Least mean resistance of an object that slides with the fingers. The lightest of
+conditions/realistic.yaml (40 g, friction 0.45) resists with 0.18 N; the mean over half a second has 0.01 N of noise."""
 BUMP_N = 1.2
 """Force that ends the descent beside the object. The hand's inertial force is 0.6 N. Fingers on a low foot toppled an
 object of 80 mm with 2.1 N."""

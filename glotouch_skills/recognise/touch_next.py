@@ -56,9 +56,7 @@ class TouchNextParams(ClosureParams):
         lt=1.0,
     )
     unmeasured: bool = param("Touch candidates that the probe did not measure, too", default=False)
-    min_gain_nats: float = param(
-        "Smallest expected gain of a closure", default=0.02, ge=0.0, formerly="least_gain_nats"
-    )
+    min_gain_nats: float = param("Smallest expected gain of a closure", default=0.02, ge=0.0)
 
 
 class TouchNext(Skill):

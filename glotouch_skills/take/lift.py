@@ -15,16 +15,8 @@ class LiftParams(SkillParams):
 
     height_m: float = param("Height of the lift", unit="m", default=0.15, gt=0.0, le=0.3)
     speed_m_s: float = param("Lifting speed", unit="m/s", default=0.06, gt=0.0, le=0.2)
-    min_weight_N: float = param(
-        "Least weight of a lifted object", unit="N", default=0.3, ge=0.0, formerly="least_weight_N"
-    )
-    min_aperture_m: float = param(
-        "Minimum aperture of jaws that hold something",
-        unit="m",
-        default=MIN_GRIP_M,
-        ge=0.0,
-        formerly="least_aperture_m",
-    )
+    min_weight_N: float = param("Least weight of a lifted object", unit="N", default=0.3, ge=0.0)
+    min_aperture_m: float = param("Minimum aperture of jaws that hold something", unit="m", default=MIN_GRIP_M, ge=0.0)
     slip_m: float = param(
         "Largest change of the aperture since the jaws closed", unit="m", default=0.004, gt=0.0, le=0.02
     )

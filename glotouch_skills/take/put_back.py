@@ -37,9 +37,7 @@ class PutBackParams(SkillParams):
     lower_speed_m_s: float = param("Speed of setting down", unit="m/s", default=0.008, gt=0.0, le=0.04)
     drop_m: float = param("Largest height above its place at which it may be released", unit="m", default=0.015, ge=0.0,
                           le=0.05)  # fmt: skip
-    min_aperture_m: float = param(
-        "Minimum aperture of jaws that hold something", unit="m", default=0.003, ge=0.0, formerly="least_aperture_m"
-    )
+    min_aperture_m: float = param("Minimum aperture of jaws that hold something", unit="m", default=0.003, ge=0.0)
 
 
 class PutBack(Skill):

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import csv
-import importlib.util
 import json
-import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,8 +19,8 @@ from glotouch_bt.bench.speed import CycleTimes, SpeedTrial, TimedRecord, TimedRo
 from glotouch_bt.campaign import Campaign
 from glotouch_bt.robot import Backend, BadInput, Command, Observation, Robot
 from glotouch_bt.robot.simulation.referee import BareSteps, Referee
+from tests.support import fake_cli
 
-FAKE_CLI = Path(__file__).parents[1] / "support" / "fake_cli.py"
 MISSION = (
     "mission: nap\nworld: container_five\ntree:\n  - wait: {name: first, seconds: 0.2}\n  - wait: {name: second}\n"
 )
@@ -47,14 +45,8 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 @pytest.fixture
 def house(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    spec = importlib.util.spec_from_file_location("fake_cli", FAKE_CLI)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "fake_cli", module)
-    spec.loader.exec_module(module)
-    module.install_fakes(monkeypatch.setattr)
-    return module
+    fake_cli.install_fakes(monkeypatch.setattr)
+    return fake_cli
 
 
 def furnish(house: ModuleType, clock: Clock, patch: pytest.MonkeyPatch, bare: BareSteps | None) -> None:

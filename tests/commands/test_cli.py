@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import re
@@ -25,6 +24,7 @@ from glotouch_bt.mission.read import library
 from glotouch_bt.mission.read.library import shipped
 from glotouch_bt.robot import BadInput
 from glotouch_bt.runs.folder import locked
+from tests.support import fake_cli
 
 
 @pytest.fixture
@@ -242,16 +242,10 @@ RUN += "tree:\n  - wait: {name: first}\n  - wait: {name: nap, seconds: $s, end: 
 
 @pytest.fixture
 def fakes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location("fake_cli", FAKE_CLI)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "fake_cli", module)
-    spec.loader.exec_module(module)
-    module.install_fakes(monkeypatch.setattr)
+    fake_cli.install_fakes(monkeypatch.setattr)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "nap.yaml").write_text(RUN)
-    return module
+    return fake_cli
 
 
 def test_a_run_leaves_its_folder(command: CliRunner, fakes: ModuleType, tmp_path: Path) -> None:

@@ -1,4 +1,21 @@
-"""Fixtures of the skills' and missions' tests that whole missions use too."""
+"""Fixtures of the skills' and missions' tests that whole missions use too, and a block."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import trimesh
 
 from tests.mission.conftest import load, registry  # noqa: F401
 from tests.skills.conftest import bench, found, things, tool, world  # noqa: F401
+
+BLOCK_M = (0.05, 0.04, 0.06)
+
+
+@pytest.fixture(scope="session")
+def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one object."""
+    folder = tmp_path_factory.mktemp("block")
+    trimesh.creation.box(BLOCK_M).export(folder / "block.stl")
+    return folder

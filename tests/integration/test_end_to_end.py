@@ -11,7 +11,6 @@ import time
 from pathlib import Path
 
 import pytest
-import trimesh
 
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import Limits
@@ -35,7 +34,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory):
 
 
 def check_result(done: RunResult) -> dict:
-    """result.json as DESIGN 7 has it: keys, types, finite numbers, sound in itself and alike on disk."""
+    """result.json: keys, types, finite numbers, sound in itself and alike on disk."""
     result = json.loads((done.folder / "result.json").read_text())
     assert result == json.loads(json.dumps(done.result))
     for key, kind in SCHEMA.items():
@@ -100,13 +99,6 @@ def test_the_same_survey_twice_is_the_same_to_the_byte(tmp_path: Path) -> None:
     records = [(r.folder / "run.mcap").read_bytes() for r in runs]
     assert records[0] == records[1]
     check_folder(runs[0])
-
-
-@pytest.fixture(scope="module")
-def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("block")
-    trimesh.creation.box((0.05, 0.04, 0.06)).export(folder / "block.stl")
-    return folder
 
 
 @pytest.mark.parametrize("yaw_deg", [0, 40])

@@ -7,20 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
 from glotouch_bt.runs.launch import RunRequest, RunResult, launch
+from tests.integration.conftest import BLOCK_M
 
-BLOCK_M = (0.05, 0.04, 0.06)
 OUTSIDE = [0.0, 0.30, 0.0]
 """On the table beside the container."""
-
-
-@pytest.fixture(scope="module")
-def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("block")
-    trimesh.creation.box(BLOCK_M).export(folder / "block.stl")
-    return folder
 
 
 def survey(objects: Path, out: Path, place: list[float], expected: int) -> RunResult:

@@ -9,20 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import trimesh
 
 from glotouch_bt.robot import Limits
 from glotouch_bt.runs import RunRequest, launch
 from glotouch_bt.validation.forces.following import MISSIONS
 
 AT_PLACE = {"x": "20", "y": "50", "width": "40", "layout": json.dumps({"block": [0.02, 0.05, 0.0]})}
-
-
-@pytest.fixture(scope="module")
-def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("block")
-    trimesh.creation.box((0.05, 0.04, 0.06)).export(folder / "block.stl")
-    return folder
 
 
 @pytest.fixture

@@ -79,7 +79,7 @@ def test_jacobian_is_the_derivative(kinematics: Kinematics) -> None:
 
 
 def test_flange_matches_the_vendors_check_values() -> None:
-    """flexiv_description's numbers, computed elsewhere: FLEXIV notes section 6."""
+    """Poses that other software computed from flexiv_description."""
     from glotouch_backends.rizon4 import XENSE_GRIPPER
 
     kinematics = Kinematics(RIZON4_XENSE)

@@ -1,7 +1,7 @@
 """Synthetic acquisition: contacts and squeezes of a mesh at a pose, without a simulator.
 
 It shares no table with the recognition model: every pad is ray-cast at full resolution at the true pose, and the gel is
-solved for each frame (SIMULATION A4, recipe C). Coupled jaws slide the object until it is centred. Not modelled:
+solved for each frame (`gel_shift`). Coupled jaws slide the object until it is centred. Not modelled:
 toppling, slip along x_P, gel shear, friction, contact outside the gel except `one_sided`.
 """
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Disturbance:
-    """Spreads (sd) and ranges of the synthetic acquisition; aperture and depth as in CONDITIONS.
+    """Spreads (sd) and ranges of the synthetic acquisition; aperture and depth as in glotouch_missions/conditions.
 
     Attributes:
         aperture_sd_m, aperture_bias_m: Noise, and uniform +- bias of a TouchSet.

@@ -79,8 +79,5 @@ def run_short(
     campaign: Campaign, executor: Executor, trials: Sequence[Trial], on_row: OnRow = silent, **given: Any
 ) -> list[Row]:
     """Run trials and write trials.csv."""
-
-    def write(rows: Sequence[Row]) -> None:
-        write_table(campaign.out, "trials.csv", COLUMNS, rows)
-
+    write = partial(write_table, campaign.out, "trials.csv", COLUMNS)
     return run_trials(executor, trials, campaign, on_row, write=write, **given)

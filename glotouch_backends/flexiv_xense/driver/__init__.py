@@ -6,6 +6,6 @@ else of this project. Its client imports `messages` from here.
 
 from . import messages
 from .clock import Clock, SteppedClock, WallClock
-from .devices import Served, Vendor
+from .devices import Vendor
 from .endpoint import HEARTBEAT_SUFFIX, load_secret_key
 from .priority import DEVICES_PRIORITY, request_realtime

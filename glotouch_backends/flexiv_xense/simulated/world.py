@@ -16,7 +16,7 @@ from glotouch_backends.mujoco.simulation import ControlTrace, TrueForce
 from glotouch_backends.options import WorldOptions
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_backends.trial_message import trial_of_message
-from glotouch_bt.robot import BackendError, BadInput, Conditions, RobotDescription, World
+from glotouch_bt.robot import BackendError, BadInput, Conditions, World
 
 
 class SimulatedWorld:
@@ -27,23 +27,15 @@ class SimulatedWorld:
     Args:
         world, conditions, seed: As for a backend.
         options: Options of the world.
-        description: The robot.
     """
 
-    def __init__(
-        self,
-        world: World,
-        conditions: Conditions,
-        seed: int,
-        options: WorldOptions,
-        description: RobotDescription = RIZON4_XENSE,
-    ) -> None:
-        self.world, self.description = world, description
+    def __init__(self, world: World, conditions: Conditions, seed: int, options: WorldOptions) -> None:
+        self.world, self.description = world, RIZON4_XENSE
         exact = [axis for axis in ("kinematic_error_sd_m", "following_error_s") if getattr(conditions, axis)]
         if exact:
             changes = "".join(f"+{axis}=0" for axis in exact)
             raise BadInput(f"the simulated arm has no {', '.join(exact)}; use --conditions {conditions.name}{changes}")
-        built = build_world(description, world, conditions, seed, options)
+        built = build_world(self.description, world, conditions, seed, options)
         self.truth, self.model, self.data, self.handles = built.truth, built.model, built.data, built.handles
         self.trace: ControlTrace | None = None
         self.true_force = TrueForce()

@@ -34,7 +34,6 @@ import scipy
 
 from glotouch_backends.mujoco.hulls.bulge import bulge_m, depth_inside_m
 from glotouch_backends.mujoco.hulls.convex_parts import trimmed_hull
-from glotouch_backends.mujoco.hulls.feet import foot_centres
 from glotouch_backends.mujoco.hulls.files import (
     MAX_VERTICES,
     Parts,
@@ -109,49 +108,36 @@ KEY = json.dumps(
 """Key of a cached result: the requested parameters. A coarser fallback is cached under the same key, with a note."""
 
 
-@dataclass(frozen=True)
-class Hulls:
-    """Collision shape of an object, in the mesh frame (lowest vertex at z = 0), m.
-
-    Attributes:
-        vertices: (k_i, 3) corners of each convex part, 4 <= k_i <= 256; read-only.
-        feet: (m, 3) centres of the foot spheres, m <= 8; see `feet`.
-    """
-
-    vertices: tuple[Array, ...]
-    feet: Array
-
-
-def load_hulls(mesh: Mesh, progress: Progress | None = None) -> Hulls:
+def load_hulls(mesh: Mesh) -> tuple[Array, ...]:
     """Return the collision shape of a mesh from the package, the user's cache, or a computation of about a minute.
 
-    Args:
-        mesh: A valid solid.
-        progress: Called with one line when something takes long or is coarser than requested. Default: a log warning,
-            which Python prints to stderr, because a silent minute looks like a hang.
+    What takes long or is coarser than requested is a log warning, which Python prints to stderr, because a silent
+    minute looks like a hang.
+
+    Returns:
+        (k_i, 3) corners of each convex part in the mesh frame (lowest vertex at z = 0), m; 4 <= k_i <= 256; read-only.
 
     Raises:
         BadInput: The solid has no volume.
     """
-    say = progress or _log.warning
     name = f"{mesh.digest}.npz"
     parts = read_parts(package_file(name), KEY)
     if parts is None:
-        parts = _from_folder(mesh, user_folder() / name, say)
+        parts = _from_folder(mesh, user_folder() / name)
     if parts.note:
-        say(f"{mesh.name}: {parts.note}")
-    return Hulls(tuple(frozen_array("hull", h, h.shape) for h in parts.hulls), foot_centres(mesh))
+        _log.warning(f"{mesh.name}: {parts.note}")
+    return tuple(frozen_array("hull", h, h.shape) for h in parts.hulls)
 
 
-def _from_folder(mesh: Mesh, path: Path, say: Progress) -> Parts:
+def _from_folder(mesh: Mesh, path: Path) -> Parts:
     found = _fitting(mesh, path)
     if found is not None:
         return found
-    with locked(path, lambda: say(f"{mesh.name}: waiting for another process to decompose it")):
+    with locked(path, lambda: _log.warning(f"{mesh.name}: waiting for another process to decompose it")):
         found = _fitting(mesh, path)  # another process may have written it meanwhile
         if found is not None:
             return found
-        return write_parts(path, KEY, decompose(mesh, say), say)
+        return write_parts(path, KEY, decompose(mesh), _log.warning)
 
 
 def _fitting(mesh: Mesh, path: Path) -> Parts | None:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from glotouch_backends.mujoco.axis_proof import AxisProof
 from glotouch_backends.mujoco.model.arm import add_arm
@@ -22,8 +21,6 @@ STEP_S = 0.001
 """Solver step."""
 STEPS = 10
 """Solver steps in a control period."""
-
-Ids = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -50,9 +47,8 @@ class Handles:
         jaw_qpos, jaw_ctrl: Slices of the two jaws in qpos and ctrl.
         hand_bodies: Slice of the bodies hand, finger_left, finger_right.
         held_bodies: The same and the probe, of one body, or of two if its shaft is compliant.
-        probe_body, tip_body, tip_site, pads_site, sensor_site: Ids.
+        probe_body, tip_body, tip_site, pads_site, sensor_site, container_body: Ids.
         object_bodies: (n,) body of each object.
-        container_body, holder_body: Ids.
         pad_geoms: (left, right).
         sensors: Columns of sensordata.
     """
@@ -71,7 +67,6 @@ class Handles:
     sensor_site: int
     object_bodies: tuple[int, ...]
     container_body: int
-    holder_body: int
     pad_geoms: tuple[int, int]
     sensors: SensorMap
 
@@ -147,7 +142,6 @@ def _handles(model: mujoco.MjModel, description: RobotDescription, objects: int)
         sensor_site=model.site("S").id,
         object_bodies=tuple(model.body(f"object{i}").id for i in range(objects)),
         container_body=model.body("container").id,
-        holder_body=model.body("holder").id,
         pad_geoms=(model.geom("pad_left").id, model.geom("pad_right").id),
         sensors=_sensor_map(dof),
     )

@@ -69,7 +69,7 @@ def add_object(spec: mujoco.MjSpec, index: int, truth: ObjectTruth, pose_B_K: Po
     body.ipos = solid.center_mass + truth.com_error_m
     body.fullinertia = (*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2])
 
-    for k, part in enumerate(load_hulls(truth.stl).vertices):
+    for k, part in enumerate(load_hulls(truth.stl)):
         vertices = printed_hull(part, truth.scale, truth.offset_m)
         shape = spec.add_mesh(name=f"object{index}_hull{k}", uservert=vertices.ravel())
         geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=shape.name, mass=0.0)

@@ -2,7 +2,6 @@
 
 from glotouch_backends.mujoco.sensing.depth import DepthErrors
 from glotouch_backends.mujoco.sensing.gel import GelSensor, PairPress, Side, pad_pose_P
-from glotouch_backends.mujoco.sensing.image import GelImager
 from glotouch_backends.mujoco.sensing.kinematics import PoseReports
 from glotouch_backends.mujoco.sensing.rays import SurfaceRays
 from glotouch_backends.mujoco.sensing.tactile import Tactile, TaxelErrors, body_pose, gel_of_trial, imager_of_trial

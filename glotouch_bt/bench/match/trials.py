@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -29,8 +29,6 @@ from glotouch_bt.perception.recognition import (
 from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene import Mesh, load_folder
-
-Kind = Literal["present", "absent", "untouched", "stranger"]
 
 TRIAL_COLUMNS = (
     "method", "kind", "seed", "target", "twin", "candidates", "best", "best_object", "right", "accepted", "p_best",

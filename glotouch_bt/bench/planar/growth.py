@@ -114,9 +114,7 @@ def run_growth(campaign: GrowthCampaign, executor: Executor, on_row: OnRow = sil
         for seed in campaign.seeds
     ]
 
-    def write(rows: list[Row]) -> None:
-        write_table(campaign.out, "trials.csv", COLUMNS, rows)
-
+    write = partial(write_table, campaign.out, "trials.csv", COLUMNS)
     rows = run_trials(executor, trials, campaign, on_row, write=write)
     return write_summary(campaign.out, summarise(rows) | campaign.described() | {"policy": campaign.policy})
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from glotouch_bt.bench.planar.section import felt_section
-from glotouch_bt.bench.planar.world import ContactModel, PlanarWorld
+from glotouch_bt.bench.planar.world import PlanarWorld
 from glotouch_bt.robot import World
 from glotouch_bt.robot.scene import UPRIGHT, Mesh, Quat, draw_layout, stream, turned
 
@@ -25,7 +25,7 @@ def lowered(mesh: Mesh, quat: Quat) -> Mesh:
     return replace(mesh, vertices_m=vertices, digest=f"{mesh.digest} {quat}")
 
 
-def planar_world(world: World, meshes: Sequence[Mesh], seed: int, model: ContactModel | None = None) -> PlanarWorld:
+def planar_world(world: World, meshes: Sequence[Mesh], seed: int) -> PlanarWorld:
     """Return the layout of a seed, with the ball where `tool_pickup` leaves it."""
     places = draw_layout(meshes, world, seed)
     meshes = [lowered(m, p.quat) for m, p in zip(meshes, places, strict=True)]
@@ -37,7 +37,6 @@ def planar_world(world: World, meshes: Sequence[Mesh], seed: int, model: Contact
         half,
         world.probe.tip_radius_m,
         stream(seed, "planar contacts"),
-        model,
     )
     corners = [np.array([x, y]) * (half - CORNER_GAP_M) for x in (1.0, -1.0) for y in (1.0, -1.0)]
     corners.sort(key=lambda place: float(np.linalg.norm(place - holder)))

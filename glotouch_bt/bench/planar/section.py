@@ -127,13 +127,13 @@ class FeltSection:
         return float(np.max(self.points_m[under, 2] + np.sqrt(self.tip_radius_m**2 - d2[under])))
 
 
-def felt_section(mesh: Mesh, probe: Probe | None = None, height_m: float = SENSING_HEIGHT_M) -> FeltSection:
-    """Return the probe section of a mesh with the ball's centre at `height_m`; cached in memory.
+def felt_section(mesh: Mesh, probe: Probe | None = None) -> FeltSection:
+    """Return the probe section of a mesh with the ball's centre at `SENSING_HEIGHT_M`; cached in memory.
 
     Raises:
         ValueError: The mesh does not reach that height.
     """
-    return _section(_Keyed(mesh.digest, mesh), probe or Probe(), height_m)
+    return _section(_Keyed(mesh.digest, mesh), probe or Probe())
 
 
 @dataclass(frozen=True)
@@ -145,28 +145,28 @@ class _Keyed:
 
 
 @lru_cache(maxsize=64)
-def _section(key: _Keyed, probe: Probe, height_m: float) -> FeltSection:
+def _section(key: _Keyed, probe: Probe) -> FeltSection:
     mesh = key.mesh
     r, s = probe.tip_radius_m, 0.5 * probe.shaft_diameter_m
     solid = mesh.as_trimesh()
-    points = _surface(solid, height_m - r, height_m - r + probe.length_m)
+    points = _surface(solid, SENSING_HEIGHT_M - r, SENSING_HEIGHT_M - r + probe.length_m)
     if len(points) == 0:
-        raise ValueError(f"{mesh.name}: nothing of it reaches the probe at {height_m * 1e3:.0f} mm")
+        raise ValueError(f"{mesh.name}: nothing of it reaches the probe at {SENSING_HEIGHT_M * 1e3:.0f} mm")
     low = points[:, :2].min(axis=0) - r - BORDER_M
     high = points[:, :2].max(axis=0) + r + BORDER_M
     shape = np.ceil((high - low) / GRID_M).astype(np.int64) + 1
     shape += -shape % COARSE  # whole coarse cells
     by_ball = scipy.spatial.cKDTree(points, balanced_tree=False)
-    upper = points[points[:, 2] >= height_m, :2]
+    upper = points[points[:, 2] >= SENSING_HEIGHT_M, :2]
     by_shaft = scipy.spatial.cKDTree(_thinned(upper), balanced_tree=False) if len(upper) else None
 
     def gap(places: Array, shaft_m: float) -> Array:
         """Return the distance of a probe with shaft radius `shaft_m` from the surface, ball at places (n, 2)."""
-        ball = by_ball.query(np.column_stack([places, np.full(len(places), height_m)]))[0] - r
+        ball = by_ball.query(np.column_stack([places, np.full(len(places), SENSING_HEIGHT_M)]))[0] - r
         return np.asarray(ball if by_shaft is None else np.minimum(ball, by_shaft.query(places)[0] - shaft_m))
 
     side, above = (
-        _signed(solid, low, _near_zero(lambda places, t=t: gap(places, t), low, shape), height_m)  # type: ignore[misc]
+        _signed(solid, low, _near_zero(lambda places, t=t: gap(places, t), low, shape))  # type: ignore[misc]
         for t in (s, r)
     )
     shrunk = side.level(-r)
@@ -183,7 +183,7 @@ def _section(key: _Keyed, probe: Probe, height_m: float) -> FeltSection:
         box_yaw_rad=yaw,
         top_m=float(mesh.vertices_m[:, 2].max()),
         pressed_m=np.asarray(solid.center_mass[:2], dtype=np.float64),
-        points_m=points[points[:, 2] >= height_m],
+        points_m=points[points[:, 2] >= SENSING_HEIGHT_M],
         tip_radius_m=r,
     )
 
@@ -249,7 +249,7 @@ def _near_zero(gap: Callable[[Array], Array], origin: Array, shape: npt.NDArray[
     return np.asarray(field)
 
 
-def _signed(solid: trimesh.Trimesh, origin: Array, field: Array, height_m: float) -> SignedGrid:
+def _signed(solid: trimesh.Trimesh, origin: Array, field: Array) -> SignedGrid:
     """Convert the unsigned gap to the surface (nx, ny) to a signed distance.
 
     Regions of positive gap outside the solid are outside; regions within the solid are inside.
@@ -259,7 +259,7 @@ def _signed(solid: trimesh.Trimesh, origin: Array, field: Array, height_m: float
     deepest = [int(np.argmax(np.where(parts == k, field, -np.inf))) for k in range(1, count + 1)]
     if deepest:
         ij = np.column_stack(np.unravel_index(deepest, field.shape))
-        places = np.column_stack([origin + GRID_M * ij, np.full(len(ij), height_m)])
+        places = np.column_stack([origin + GRID_M * ij, np.full(len(ij), SENSING_HEIGHT_M)])
         solidly[1:] = solid.contains(places)
     within = solidly[parts]
     signed = np.where(within, -np.abs(field) - GRID_M, field)

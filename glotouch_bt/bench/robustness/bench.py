@@ -12,7 +12,7 @@ from glotouch_bt.bench.match import DEFAULT, decide, sampled_layout
 from glotouch_bt.bench.robustness.axes import AXES, changed
 from glotouch_bt.bench.robustness.plot import plot_axes
 from glotouch_bt.bench.statistics import bootstrap_mean
-from glotouch_bt.campaign import Campaign, OnRow, Row, crashed, run_trials, silent, write_summary, write_table
+from glotouch_bt.campaign import Campaign, OnRow, crashed, run_trials, silent, write_summary, write_table
 from glotouch_bt.escaped_text import finite
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.read import load_conditions
@@ -88,9 +88,7 @@ def run_campaign(campaign: RobustnessCampaign, executor: Executor, on_row: OnRow
         for seed in campaign.seeds
     ]
 
-    def write(rows: Sequence[Row]) -> None:
-        write_table(campaign.out, "points.csv", COLUMNS, rows)
-
+    write = partial(write_table, campaign.out, "points.csv", COLUMNS)
     rows = run_trials(executor, trials, campaign, on_row, write=write)
     axes: dict[str, list[dict[str, Any]]] = {}
     for axis, level in campaign.points:

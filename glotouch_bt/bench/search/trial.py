@@ -26,7 +26,7 @@ from glotouch_bt.robot import Array, BadInput, Pose, World
 from glotouch_bt.robot.scene import Mesh, load_folder
 from glotouch_bt.runs import RunRequest
 
-SWEEP_NODE, TRACE_NODE, REFINE_NODE, PICKUP_NODE = "guarded_sweep", "orbit_probe", "refine_outline", "tool_pickup"
+SWEEP_NODE, TRACE_NODE, REFINE_NODE = "guarded_sweep", "orbit_probe", "refine_outline"
 TOP_NODE = "touch_top"
 STILL_M = 0.0003
 """Smallest step that counts as travel; a standing arm sways by less."""

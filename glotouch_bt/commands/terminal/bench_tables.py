@@ -60,7 +60,7 @@ def print_growth(summary: dict[str, Any], folder: Path) -> None:
         f"{k.rsplit('_', 1)[0]}: objects^{s['objects']:.2f} area^{s['area']:.2f}" for k, s in summary["slopes"].items()
     )
     text = f"growth of {'; '.join(words)}\n{folder / 'summary.json'}"
-    EscapingConsole().print(text, markup=False, highlight=False, soft_wrap=True)
+    EscapingConsole().plain(text)
 
 
 def print_robustness(summary: dict[str, Any], folder: Path) -> None:
@@ -88,7 +88,7 @@ def print_robustness(summary: dict[str, Any], folder: Path) -> None:
         rows,
     )
     where = f"{folder / 'robustness.png'}\n{folder / 'summary.json'}"
-    EscapingConsole().print(where, markup=False, highlight=False, soft_wrap=True)
+    EscapingConsole().plain(where)
 
 
 def print_speed(summary: dict[str, Any], folder: Path) -> None:
@@ -177,7 +177,7 @@ def print_search(summary: dict[str, Any], folder: Path) -> None:
             if q["n"]
         ]
         print_table("candidates of the first policy", ("error", "median", "95 %", "n"), errors)
-    EscapingConsole().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
+    EscapingConsole().plain(f"{folder / 'summary.json'}")
 
 
 def print_counts(summary: dict[str, Any], folder: Path) -> None:
@@ -198,7 +198,7 @@ def print_counts(summary: dict[str, Any], folder: Path) -> None:
         ("Brier score of all stated chances", "{mean:.3f} [{lo:.3f}, {hi:.3f}]".format_map(stated["brier"])),
     ]
     print_table("chance that something is left", ("", "value"), figures)
-    EscapingConsole().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
+    EscapingConsole().plain(f"{folder / 'summary.json'}")
 
 
 def print_contact(summary: dict[str, Any], folder: Path) -> None:
@@ -226,7 +226,7 @@ def print_contact(summary: dict[str, Any], folder: Path) -> None:
     print_table(title + f"{summary['contacts_per_side']} contacts per side", head, rows)
     if summary["not_traced"]:
         print_table("not traced", ("trial and cause",), [(c,) for c in summary["not_traced"]])
-    EscapingConsole().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
+    EscapingConsole().plain(f"{folder / 'summary.json'}")
 
 
 def print_match(summary: dict[str, Any], folder: Path) -> None:
@@ -308,6 +308,4 @@ def print_match(summary: dict[str, Any], folder: Path) -> None:
         f"a cached one {value(timing.get('load_stl_ms'), 0)} ms"
     )
     felt = f"{summary['touched']} of {summary['objects']} objects touched, {summary['nameless']} false candidates"
-    EscapingConsole().print(
-        f"{cost_of_stl}\n{felt}\n{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True
-    )
+    EscapingConsole().plain(f"{cost_of_stl}\n{felt}\n{folder / 'summary.json'}")

@@ -22,8 +22,8 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
     for n, row in enumerate(rows, 1):
         left += 0.0 if row["done"] else row["minutes"]
         state = "done" if row["done"] else minutes(row["minutes"])
-        console.print(f"{n:3} {row['name']}: {row['title']} ({state})", markup=False, highlight=False, soft_wrap=True)
+        console.plain(f"{n:3} {row['name']}: {row['title']} ({state})")
         parts = f"   for {', '.join(row['parts'])}" if row["parts"] else ""
         for line in row["commands"]:
-            console.print(f"      {line}{parts}", markup=False, highlight=False, soft_wrap=True, style="dim")
+            console.plain(f"      {line}{parts}", "dim")
     console.print(f"{minutes(left)} left on two cores, as estimated from earlier campaigns", highlight=False)

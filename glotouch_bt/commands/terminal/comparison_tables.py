@@ -18,7 +18,7 @@ def print_comparison(found: dict[str, Any]) -> None:
     for side in ("a", "b"):
         c = found[side]
         commit = f", commit {c['commit']}" if c["commit"] else ""
-        _plain(console, f"{side.upper()}: {c['folder']} ({c['trials']} trials{commit})")
+        console.plain(f"{side.upper()}: {c['folder']} ({c['trials']} trials{commit})")
     rows = [(d["what"], _short(d["a"]), _short(d["b"])) for d in found["differs"]]
     print_table("what differs", ("", "A", "B"), rows or [("nothing: code, settings and objects are the same", "", "")])
     for label, group in found["groups"].items():
@@ -42,19 +42,15 @@ def print_comparison(found: dict[str, Any]) -> None:
         _names(console, f"succeeds only in {side.upper()}", found["turned"][f"only_{side}"])
         _names(console, f"without a partner, only in {side.upper()}", found["unpaired"][side])
     for column, count in found["missing"].items():
-        _plain(console, f"{column}: {count} pairs have a value in one campaign only, and are left out")
+        console.plain(f"{column}: {count} pairs have a value in one campaign only, and are left out")
     count = sum(len(g["rates"]) + len(g["numbers"]) for g in found["groups"].values())
-    _plain(console, f"{count} figures are compared: by chance, one in twenty lies outside its 95 % interval")
-
-
-def _plain(console: EscapingConsole, text: str) -> None:
-    console.print(text, markup=False, highlight=False, soft_wrap=True)
+    console.plain(f"{count} figures are compared: by chance, one in twenty lies outside its 95 % interval")
 
 
 def _names(console: EscapingConsole, what: str, names: Sequence[str]) -> None:
     if names:
         more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-        _plain(console, f"{what}: {len(names)} ({', '.join(names[:NAMED])}{more})")
+        console.plain(f"{what}: {len(names)} ({', '.join(names[:NAMED])}{more})")
 
 
 def _difference(m: dict[str, Any], factor: float = 1.0, digits: int = 3) -> str:

@@ -25,6 +25,10 @@ class EscapingConsole(Console):
         for segment in super().render(renderable, options):
             yield segment if segment.control else Segment(visible(segment.text), segment.style)
 
+    def plain(self, text: str, style: str | None = None) -> None:
+        """Print a text without markup, colours of its words or line breaks of the console's own."""
+        self.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
 
 def print_error(message: str) -> None:
     """Print one message on stderr without markup or wrapping."""
@@ -35,9 +39,6 @@ def print_result(done: RunResult) -> None:
     """Print the end of a run: the reasons, the faults, the path of the report, and last the results."""
     console = EscapingConsole()
     r = done.result
-
-    def plain(text: str) -> None:
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     head = {"success": "[bold green]done[/]", "failure": "[bold red]failed[/]"}.get(
         str(r["status"]), "[bold red]aborted[/]"
@@ -52,16 +53,16 @@ def print_result(done: RunResult) -> None:
         soft_wrap=True,
     )
     for i, reason in enumerate(r["reasons"]):
-        plain(f"{'  ' * i}{'because ' if i else ''}{reason}")
+        console.plain(f"{'  ' * i}{'because ' if i else ''}{reason}")
     if r.get("ending"):
-        plain(str(r["ending"]))
+        console.plain(str(r["ending"]))
     if r.get("unscored"):
-        plain(f"not scored: {r['unscored']}")
+        console.plain(f"not scored: {r['unscored']}")
     for fault in r.get("faults", ()):
-        plain(_fault_in_words(fault))
-    plain(f"record: {done.folder}" if done.report is None else f"report: {done.report}")
+        console.plain(_fault_in_words(fault))
+    console.plain(f"record: {done.folder}" if done.report is None else f"report: {done.report}")
     for result in (r.get("results") or {}).values():
-        plain(f"result: {result['text']}")
+        console.plain(f"result: {result['text']}")
     expected = r["parameters"].get("expected_objects")
     if expected is not None:
         found = len(r["candidates"])

@@ -31,12 +31,11 @@ class RunProgress:
 
     Args:
         quiet: Print nothing.
-        keys: The operator's keys are read.
     """
 
-    def __init__(self, quiet: bool, keys: bool = True) -> None:
+    def __init__(self, quiet: bool) -> None:
         self._console = EscapingConsole(stderr=True)
-        self._quiet, self._keys = quiet, keys
+        self._quiet = quiet
         self._live: Live | None = None
         self._began_s = self._shown_s = 0.0
         self._last_node = ""
@@ -86,7 +85,7 @@ class RunProgress:
             line = (
                 f"t = {robot_s:6.1f} s  {node:<14} contacts {summary.contacts:3d}  objects {len(summary.candidates):2d}"
             )
-            self._console.print(line + _best(summary), markup=False, highlight=False, soft_wrap=True)
+            self._console.plain(line + _best(summary))
 
     def _lines(self, robot_s: float, wall_s: float, summary: RunSummary) -> Group:
         """Return the lines of a terminal."""
@@ -98,7 +97,7 @@ class RunProgress:
         times = f"        robot {_clock(robot_s)}   wall {_clock(wall_s)}" + (f" ({speed:.0f}x)" if speed else "")
         if self._usual_s is not None and speed:
             times += f"   about {_clock(max(self._usual_s - robot_s, 0.0) / speed)} left"
-        keys = f"   p {'goes on' if word == 'PAUSED' else 'pauses'}, Ctrl-C ends" if self._keys else ""
+        keys = f"   p {'goes on' if word == 'PAUSED' else 'pauses'}, Ctrl-C ends"
         return Group(
             doing,
             Text(facts, no_wrap=True, overflow="ellipsis"),

@@ -45,4 +45,4 @@ def print_space(summary: dict[str, Any], folder: Path) -> None:
             if column[what]:
                 head = ("objects that were not moved" if what == "not_done" else "layouts", "count")
                 print_table(f"{act}: {what.replace('_', ' ')}", head, [(c, str(n)) for c, n in column[what].items()])
-    EscapingConsole().print(f"{folder / 'summary.json'}", markup=False, highlight=False, soft_wrap=True)
+    EscapingConsole().plain(f"{folder / 'summary.json'}")

@@ -11,8 +11,6 @@ from glotouch_bt.faults.effects import arm, gripper, model, process, tactile, wo
 from glotouch_bt.faults.effects.base import Effect
 from glotouch_bt.mission.read import limits_of, unit_of
 
-CHANNELS = ("wrench", "touch", "gripper", "arm", "world", "model", "process")
-
 CAUSE_PATTERNS: Mapping[str, str] = {
     "wrench": r"wrench|wrist|force|torque|weigh|off_zero|hard_contact|\btare",
     "touch": r"tactile|depth map|\bpads?\b|taxel|\bgel|\bframes?\b",
@@ -32,7 +30,7 @@ class FaultKind:
 
     Attributes:
         name: As written in a plan.
-        channel: Faulted part of the system, one of `CHANNELS`.
+        channel: Faulted part of the system, a key of `CAUSE_PATTERNS`.
         summary: One line for people.
         effect: The class that applies it.
         seen_by: Expected detector, for people.

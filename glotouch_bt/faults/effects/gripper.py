@@ -32,7 +32,7 @@ class GripShortParams(FaultParams):
     """Parameters of `grip_short`."""
 
     short_m: float = param("Distance of the jaws short of the target", unit="m", default=0.004, gt=0.0, le=0.08)
-    min_m: float = param("Smallest aperture they reach", unit="m", default=0.0, ge=0.0, le=0.08, formerly="least_m")
+    min_m: float = param("Smallest aperture they reach", unit="m", default=0.0, ge=0.0, le=0.08)
 
 
 class GripShort(Effect[GripShortParams]):

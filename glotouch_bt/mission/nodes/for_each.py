@@ -47,7 +47,7 @@ class ForEachSettings(Settings):
     item: str = Field(description="key each item is written to")
     collect: dict[str, str] = Field(default_factory=dict, description="child's key: key of the tuple it is gathered in")
     on_failure: Literal["continue", "stop"] = Field(default="stop", description="what a failing item does")
-    order_by: str | None = param("field by which items are sorted, ascending", default=None, formerly="least_first")
+    order_by: str | None = param("field by which items are sorted, ascending", default=None)
 
 
 class ForEach(MissionDecorator):

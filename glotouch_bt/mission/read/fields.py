@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType, UnionType
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
@@ -118,7 +117,6 @@ def validate(
         where: Place of missing keys (default: the mapping).
         beside: Other names that are valid here, each with the key under which it is written; empty: here.
     """
-    given = _with_new_names(model, given, what, findings)
     values: dict[str, Any] = {}
     poisoned: set[str] = set()
     known = True
@@ -152,19 +150,6 @@ def validate(
         if isinstance(node, Scalar) and node.span is not None and str(key.value) in model.model_fields:
             _check_span(node, str(key.value), model.model_fields[str(key.value)], findings)
     return made if known and not poisoned else None
-
-
-def _with_new_names(model: type[BaseModel], given: Map, what: str, findings: Findings) -> Map:
-    """Replace the old names of parameters (`param(formerly=...)`), with a warning; a new name beside it wins."""
-    renamed = {old: n for n, field in model.model_fields.items() if (old := _extra(field, "formerly"))}
-    entries: list[tuple[Scalar, Node]] = []
-    for key, node in given.entries:
-        new = renamed.get(str(key.value), "")
-        if new and new not in given:
-            findings.add(key.place, "renamed", f"{key.value!r} of {what} is now called {new!r}")
-            key = replace(key, value=new)
-        entries.append((key, node))
-    return replace(given, entries=tuple(entries))
 
 
 def _check_span(node: Scalar, name: str, field: FieldInfo, findings: Findings) -> None:

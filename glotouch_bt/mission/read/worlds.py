@@ -251,7 +251,7 @@ def _section_place(node: Map, section: str, dotted: str) -> Place:
     return node.place
 
 
-def load_world(given: str, objects: Path | None = None) -> World:
+def load_world(given: str) -> World:
     """Load a world by path or shipped name.
 
     Raises:
@@ -259,7 +259,7 @@ def load_world(given: str, objects: Path | None = None) -> World:
     """
     path = find_shipped("worlds", given, "world")
     findings = Findings()
-    world = read_world(read_yaml(path, shown(path)), path, findings, objects)
+    world = read_world(read_yaml(path, shown(path)), path, findings)
     if world is None:
         raise MissionFaults(findings.sorted())
     return world

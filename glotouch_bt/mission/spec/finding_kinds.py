@@ -157,7 +157,6 @@ _KINDS = (
         "the loop either ends after its first pass or runs until its limit",
     ),
     # warnings
-    _Warning("renamed", "the name is an old one", "files with old names still load", "write the new name", brief=True),
     _Warning(
         "input_never_written",
         "no node ever writes this optional input",

@@ -17,10 +17,10 @@ ContourKind = Literal["round", "box"]
 ContourFamily = Literal["circle", "rectangle", "free"]
 
 ZERO_SD_M = 0.3e-3
-"""Standard deviation of an uncalibrated jaw zero. Source: CONDITIONS, nominal 0.23 mm, harsh 0.58 mm."""
+"""Standard deviation of an uncalibrated jaw zero. Source: 0.23 mm in conditions/nominal.yaml, 0.58 mm in harsh.yaml."""
 
 PAD_NOISE_M = 2e-5
-"""Standard deviation of an untouched pad's taxel. Source: CONDITIONS, nominal."""
+"""Standard deviation of an untouched pad's taxel. Source: conditions/nominal.yaml."""
 
 
 @dataclass(frozen=True)

@@ -90,11 +90,6 @@ def joint_poses(description: RobotDescription, q: Array) -> list[Pose]:
     return poses
 
 
-def hand_pose(description: RobotDescription) -> Pose:
-    """Return the flange frame E in the frame of the last joint."""
-    return description.pose_last_E
-
-
 def finger_shift_m(aperture_m: float, side: float) -> tuple[float, float, float]:
     """Return the position of a finger's frame in P: the left finger (side 1) is at +y_P, the right one (-1) at -y_P."""
     return (0.0, side * 0.5 * aperture_m, 0.0)
@@ -214,21 +209,21 @@ def prism(outline_m: Array, height_m: float) -> tuple[Array, npt.NDArray[np.int6
     """Return the wall of an upright prism over a closed polyline (n, 2), from 0 to a height, without lids."""
     n = len(outline_m)
     low, high = np.zeros((n, 1)), np.full((n, 1), height_m)
-    vertices = np.concatenate([np.hstack([outline_m, low]), np.hstack([outline_m, high])])
-    i = np.arange(n - 1)
-    quads = np.stack([i, i + 1, n + i + 1, n + i], axis=1)
-    return vertices, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return _strip(np.hstack([outline_m, low]), np.hstack([outline_m, high]))
 
 
 def band(outline_m: Array, across_m: Array, height_m: float) -> tuple[Array, npt.NDArray[np.int64]]:
     """Return a flat ring around a closed polyline (n, 2): `across_m` (n, 2) to each side, at a height."""
-    n = len(outline_m)
-    z = np.full((n, 1), height_m)
-    inner, outer = outline_m - across_m, outline_m + across_m
-    vertices = np.concatenate([np.hstack([inner, z]), np.hstack([outer, z])])
+    z = np.full((len(outline_m), 1), height_m)
+    return _strip(np.hstack([outline_m - across_m, z]), np.hstack([outline_m + across_m, z]))
+
+
+def _strip(one: Array, other: Array) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Return the surface between two polylines (n, 3)."""
+    n = len(one)
     i = np.arange(n - 1)
     quads = np.stack([i, i + 1, n + i + 1, n + i], axis=1)
-    return vertices, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return np.concatenate([one, other]), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def _solid(frame: str, name: str, mesh: trimesh.Trimesh, colour: Colour) -> Solid:

@@ -73,10 +73,7 @@ class _Picture:
 
     def branch(self, node: TreeNode, depth: int, failing: bool) -> str:
         """Return a node and everything below it; a chain of only children is one line."""
-        names = [node.name]
-        while len(node.children) == 1 and node.children[0].status == node.status:
-            node = node.children[0]
-            names.append(node.name)
+        names, node = node.chain()
         line = self._line(node, names, depth)
         if not node.children:
             return f'<div class="leaf">{line}</div>'

@@ -1,6 +1,6 @@
 """The state of a mission at any time, from its record: pure values for every view of it. Knows no page and no robot."""
 
-from glotouch_bt.report.state.model import NO_WINDOW_M, GrowingRows, RunModel
+from glotouch_bt.report.state.model import GrowingRows, RunModel
 from glotouch_bt.report.state.parse import felt_points_P, true_bodies
 from glotouch_bt.report.state.player import Player
 from glotouch_bt.report.state.setup import RunSetup, planned_nodes, read_setup
@@ -15,5 +15,4 @@ from glotouch_bt.report.state.values import (
     PlannedGrasp,
     SceneState,
     Share,
-    TouchPoint,
 )

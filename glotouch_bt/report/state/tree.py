@@ -40,6 +40,14 @@ class TreeNode:
         """Return the number of nodes below."""
         return sum(1 + c.count() for c in self.children)
 
+    def chain(self) -> tuple[list[str], TreeNode]:
+        """Return the names from here down a chain of only children of the same status, and its last node."""
+        node, names = self, [self.name]
+        while len(node.children) == 1 and node.children[0].status == node.status:
+            node = node.children[0]
+            names.append(node.name)
+        return names, node
+
 
 def tree_of(nodes: dict[str, str]) -> TreeNode:
     """Return the tree of nodes with a status each, by path, parents before their children."""
@@ -70,10 +78,7 @@ def tree_rows(nodes: dict[str, str], *, whole: bool = False) -> list[TreeRow]:
     rows: list[TreeRow] = []
 
     def add(node: TreeNode, depth: int) -> None:
-        names = [node.name]
-        while len(node.children) == 1 and node.children[0].status == node.status:
-            node = node.children[0]
-            names.append(node.name)
+        names, node = node.chain()
         ends = names if len(names) < 3 else [names[0], "…", names[-1]]
         unfold = whole or (node.status == "RUNNING" if running else node.status == "FAILURE" or depth < TOP_LEVELS)
         rows.append(TreeRow(" › ".join(ends), " › ".join(names), depth, node.status, 0 if unfold else node.count()))

@@ -7,28 +7,6 @@ from dataclasses import dataclass, fields
 
 from glotouch_bt.errors import ParamError
 
-GUARDS = {
-    "not_finite": "a reading is not finite (single samples are dropped)",
-    "stamps": "a sample is not later than the one before it (single samples are dropped)",
-    "samples_missing": "a control period repeatedly has less than a quarter of its samples",
-    "overrun": "control periods pass without a command while the arm moves: too many at once, or too often",
-    "joint_range": "a joint is measured outside its range",
-    "joint_speed": "a joint is measured faster than its limit",
-    "out_of_reach": "a pose beyond the reach of any arm, or a quaternion that is not of unit length",
-    "wrench": "consecutive samples of the wrench are beyond the limit at which the robot stops",
-    "wrench_stuck": "some or all components of a noisy wrench sensor stand still",
-    "wrench_silent": "the wrist does not feel the inertia of the moving hand",
-    "wrench_noise": "the force jumps from sample to sample (only recorded)",
-    "following": "the hand is not where it was told to be, or will not be soon",
-    "gripper_stale": "the gripper stopped reporting",
-    "tactile_stale": "requested depth maps do not arrive",
-    "tactile_frozen": "noisy depth maps repeat",
-    "tactile_dead": "depth maps with hardly a live taxel, or with infinities, arrive repeatedly",
-    "command": "a setpoint or a jaw target is not finite, out of range, or a jump",
-    "device": "the device or its driver failed",
-}
-"""Condition that trips each guard, by name."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class SupervisionLimits:
@@ -57,7 +35,8 @@ class SupervisionLimits:
             servo's lag, doubled.
         command_slack: Commanded over allowed speed. Source: ours, rounding and the end of a profile.
         gripper_age_s, tactile_age_s: Oldest gripper report, longest wait for a requested depth map. Source:
-            `Limits.max_age_s`; five times the slowest gripper of CONDITIONS, twice its slowest depth maps.
+            `Limits.max_age_s`; over six times the slowest gripper and twice the slowest depth maps of
+            conditions/harsh.yaml.
         stuck_s: Duration of bit-identical wrench samples. Source: ours, a third of the shortest rest at which a probing
             skill averages the force (120 ms).
         noisy_s: A sensor counts as noisy after this time in which the force went up and down in every period by more
@@ -67,9 +46,9 @@ class SupervisionLimits:
         silent_share: Least share of that sum. Source: ours; a delay of 0.05 s leaves a tenth, one of 0.1 s nothing.
         noise_N: A smaller change between two periods is not noise. Source: ours, a fiftieth of the sensors' resolution.
         max_noise_N, noise_over_s: Mean jump of a force component from sample to sample, over this time. Source: three
-            times that of harsh CONDITIONS (noise of 0.15 N sd jumps by 0.17 N).
-        live_taxels: Smallest share of a pad that delivers numbers. Source: harsh CONDITIONS have 3 % dead taxels; half
-            of a pad cannot be matched.
+            times that of conditions/harsh.yaml (noise of 0.15 N sd jumps by 0.17 N).
+        live_taxels: Smallest share of a pad that delivers numbers. Source: conditions/harsh.yaml has 3 % dead
+            taxels; half of a pad cannot be matched.
         late_periods: Longest wait of a moving arm, and most missing samples within `window_s`, in periods. Source: the
             watchdog's 0.25 s. The device meanwhile holds (the driver after 30 ms) and enforces the hard limit.
         held_periods: Wait after which the device has held by itself. Source: the driver's 30 ms. Shorter waits are only
@@ -117,7 +96,7 @@ class GuardFinding:
     """One finding of a guard.
 
     Attributes:
-        guard: A key of `GUARDS`.
+        guard: Its name; docs/explanation/supervision.md lists them.
         what: One clause with units and the valid range.
         value: The offending value.
         limit: What it passed.

@@ -42,7 +42,7 @@ SAME_SIGMAS = 3.0
 """The same in standard deviations of the difference, for noisy sensors. Source: ours."""
 FIXTURE_M = 0.003
 """A contact within this distance of the floor or a wall is one with the container, which cannot be pushed. Source:
-ours; twice the registration's error (harsh CONDITIONS)."""
+ours; twice the registration's error (conditions/harsh.yaml)."""
 SETTLE_S = 0.02
 """Rest after a contact before the force on the bent probe is read. Source: ours; the sensor's latency, and the ringing
 of a compliant probe (40 Hz, damped by the gel)."""

@@ -105,9 +105,7 @@ def run_campaign(campaign: ForceCampaign, executor: Executor, on_row: OnRow = si
         failed = partial(failed_trial, p.labels, campaign.out / p.labels["folder"])
         trials.append(Trial.of(request, run, failed))
 
-    def write(rows: Sequence[Row]) -> None:
-        write_table(campaign.out, "trials.csv", COLUMNS, rows)
-
+    write = partial(write_table, campaign.out, "trials.csv", COLUMNS)
     rows = run_trials(executor, trials, campaign, on_row, write=write, before=len(twins))
     return _written(campaign, twins, rows, {p.labels["folder"]: p for p in planned})
 

@@ -37,14 +37,12 @@ class MistakeRow:
     Attributes:
         mistake: The mistake.
         ours: Our finding on the right line, or None.
-        others: Number of further findings.
         py_trees: Error of py_trees, or empty.
         when: build, setup, tick N, or never.
     """
 
     mistake: Mistake
     ours: Finding | None
-    others: int
     py_trees: str
     when: str
 
@@ -76,10 +74,9 @@ def _found(text: str) -> list[Finding]:
 
 
 def _row(mistake: Mistake) -> MistakeRow:
-    found = _found(mistake.text)
-    ours = next((f for f in found if f.code == mistake.code and f.place.line == mistake.line), None)
+    ours = next((f for f in _found(mistake.text) if f.code == mistake.code and f.place.line == mistake.line), None)
     said, when = _in_py_trees(mistake)
-    return MistakeRow(mistake, ours, len(found) - (ours is not None), said, when)
+    return MistakeRow(mistake, ours, said, when)
 
 
 def _in_py_trees(mistake: Mistake) -> tuple[str, str]:

@@ -19,8 +19,8 @@ from glotouch_skills.common.hand.descent import note_open_fingers
 
 GENTLE_FORCE_N = 3.0
 """Jaw force until both jaws rest. Coupled jaws of which only one touches push with twice this force. 6 N slide the
-heaviest object of CONDITIONS (3.1 N of friction); 20 N (squeeze) or 60 N (grasp) would tilt and wedge an object that
-cannot slide."""
+heaviest object of conditions/nominal.yaml (3.1 N of friction); 20 N (squeeze) or 60 N (grasp) would tilt and wedge an
+object that cannot slide."""
 RAMP_N_S = 100.0
 """Rise of the jaw force once the jaws rest: one newton a control period. Applied at once, 10 N of jaw force became 20
 N on the hand within a period where a fingertip stood on a foot."""
@@ -39,8 +39,9 @@ MAX_HAND_FORCE_N = 20.0
 """Never press the hand harder than this: two thirds of the robot's own limit."""
 MAX_REST_FORCE_N = 3.2
 """Refuse to press above this change of the force on the hand once gentle jaws rest. A free object transmits at most its
-floor friction (3.1 N for the heaviest of CONDITIONS); a larger force means it is wedged, and pressing harder makes it
-snap. All three closures that passed 30 N were above this limit, the least with 3.3 N. Source: simulation, nominal."""
+floor friction (3.1 N for the heaviest of conditions/nominal.yaml); a larger force means it is wedged, and pressing
+harder makes it snap. All three closures that passed 30 N were above this limit, the least with 3.3 N. Source:
+simulation, nominal."""
 MAX_TWIST_NM = 0.25
 """Largest torque about z_P with which the jaws turn an object that the two gels touch at different places along x_P.
 30 N at contacts 8 mm apart reach it. A box of 50 mm by 40 mm was held by opposite corners, 17 mm apart. It

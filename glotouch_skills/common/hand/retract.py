@@ -14,7 +14,8 @@ RISE_M_S = 0.10
 NEAR_ENOUGH_M = 0.002
 """Do not rise by less than this."""
 CAUGHT_N = 15.0
-"""Change of force that stops the rise: half of the robot's hard limit. The heaviest object of CONDITIONS weighs 4 N."""
+"""Change of force that stops the rise: half of the robot's hard limit. The heaviest object of
+conditions/nominal.yaml weighs 4 N."""
 
 
 def rise_clear(arm: Arm, speed_m_s: float = RISE_M_S) -> Motion[float]:

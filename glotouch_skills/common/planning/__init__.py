@@ -3,8 +3,6 @@
 from glotouch_skills.common.planning.clear_plan import Clearing, ClearPlanner, FreePlace
 from glotouch_skills.common.planning.finger_space import (
     Neighbour,
-    clearance_m,
-    finger_clearance_m,
     finger_space_m,
     gap_m,
     sampled,
@@ -13,7 +11,6 @@ from glotouch_skills.common.planning.grasp_holds import SHIFTS_M
 from glotouch_skills.common.planning.grasp_plan import GraspPlan, plan_grasp
 from glotouch_skills.common.planning.outline_grasp import outline_grasp
 from glotouch_skills.common.planning.push_plan import (
-    MAY_TOUCH_M,
     NEEDED_M,
     Push,
     PushPlanner,

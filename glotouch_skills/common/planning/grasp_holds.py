@@ -28,7 +28,7 @@ LEVER_SCALE_M = 0.015
 OPPOSITE_M = 0.006
 """Offset between the middles of the two contacts that halves it: closing pads would turn the object."""
 STEEP = 0.6
-"""Mean slope under a pad that halves it. Source: the least pad friction of CONDITIONS (harsh)."""
+"""Mean slope under a pad that halves it. Source: the least pad friction of conditions/harsh.yaml."""
 FINGER_M = 0.001
 """The object may reach this much farther towards a finger than towards its pad: the pad protrudes a little and its gel
 yields. An object that reaches farther is held by the fingers, not the pads."""

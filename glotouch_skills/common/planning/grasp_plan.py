@@ -39,7 +39,8 @@ MAX_MISFIT_M = 0.002
 """The pose is credible if, after removal of one offset, the widths of three quarters of the closures are within this of
 the mesh. Larger than the scatter of widths in recognition, because the place of a closure is uncertain, too."""
 MIN_OFFSET_M = -0.004
-"""Least offset of measured widths from the mesh: both gels yield, and the jaws' zero is off (CONDITIONS)."""
+"""Least offset of measured widths from the mesh: both gels yield, and the jaws' zero is off (1 mm in
+conditions/harsh.yaml)."""
 MAX_OFFSET_M = 0.0015
 """Largest such offset."""
 MIN_LAYERS = 3

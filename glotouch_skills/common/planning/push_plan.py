@@ -46,7 +46,8 @@ MAX_LEVER_M = 0.003
 SLIM = 0.25
 """Least ratio of half the object's depth, along the push, to its height: a slimmer one may topple. The push acts at the
 height where the object reaches farthest towards the flat fingers, h. It topples if friction times h is above half the
-depth; with a friction of 0.6 (middle of CONDITIONS), the ratio allows h up to 0.42 of the height."""
+depth; with a friction of 0.6 (about the middle of conditions/nominal.yaml), the ratio allows h up to 0.42 of the
+height."""
 KEEP_M = 0.003
 """Gap that a pushed object keeps from the others. One that starts nearer only has to come no nearer."""
 COMES_NEARER_M = 0.0005

@@ -17,10 +17,8 @@ class TracingParams(SkillParams):
     radial_sd_m: float = param(
         "... and the outline's, in every direction, below this", unit="m", default=0.004, gt=0.0, le=0.03
     )
-    min_contacts: int = param(
-        "Fewest contacts, whatever the covariance says", default=4, ge=3, le=60, formerly="least_contacts"
-    )
-    max_contacts: int = param("Most contacts in all", default=14, ge=3, le=60, formerly="most_contacts")
+    min_contacts: int = param("Fewest contacts, whatever the covariance says", default=4, ge=3, le=60)
+    max_contacts: int = param("Most contacts in all", default=14, ge=3, le=60)
     orbit_speed_m_s: float = param("Speed beside the object", unit="m/s", default=0.05, gt=0.0, le=0.08)
     probe_speed_m_s: float = param("Probing speed", unit="m/s", default=0.02, gt=0.0, le=0.06)
     lower_speed_m_s: float = param("Speed down beside it", unit="m/s", default=0.02, gt=0.0, le=0.06)

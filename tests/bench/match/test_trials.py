@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,6 +16,7 @@ from glotouch_bt.bench.match.trials import decide, pose_errors, signed_margin
 from glotouch_bt.perception.recognition import Match
 from glotouch_bt.robot.scene import load_folder
 from tests.bench.match.conftest import a_layout, by_size
+from tests.support import shapes
 
 HERE, THERE = Path("here"), Path("there")
 
@@ -86,11 +85,6 @@ def a_match(yaw, xy=(0.0, 0.0)):
 
 def test_symmetries_of_solids(tmp_path):
     """A jar is one of revolution, a cross has four, a roofed block two, an L one; yaw errors are up to them."""
-    file = Path(__file__).parents[2] / "support" / "shapes.py"
-    spec = importlib.util.spec_from_file_location("stand_in_shapes_of_match", file)
-    shapes = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = shapes
-    spec.loader.exec_module(shapes)
     shapes.write(tmp_path, ["jar", "cross", "house", "l_block"])
     meshes = {m.name: m for m in load_folder(tmp_path)}
     turns = {n: np.rad2deg(symmetries_rad(m)).round(6).tolist() for n, m in meshes.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import random
@@ -21,6 +20,7 @@ from typer.testing import CliRunner
 from glotouch_bt import cli
 from glotouch_bt.mission.checkpoint.store import CHECKPOINT_FILE
 from glotouch_bt.report import read_run
+from tests.support import fake_cli
 
 FAKE_CLI = Path(__file__).parents[2] / "support" / "fake_cli.py"
 HEAD = "mission: m\nworld: container_five\nparameters:\n  end: {type: str, default: ok}\n"
@@ -40,14 +40,8 @@ DIFFERS = ("wall_time_s", "wall_open_s", "resumed")
 
 def glotouch(*words: object) -> Any:
     """In this process: starting one takes longer than the mission."""
-    spec = importlib.util.spec_from_file_location("fake_cli", FAKE_CLI)
-    assert spec is not None
-    assert spec.loader is not None
     with pytest.MonkeyPatch.context() as patch:
-        house = importlib.util.module_from_spec(spec)
-        patch.setitem(sys.modules, "fake_cli", house)
-        spec.loader.exec_module(house)
-        house.install_fakes(patch.setattr)
+        fake_cli.install_fakes(patch.setattr)
         done = CliRunner().invoke(cli.app, [str(w) for w in words])
     return SimpleNamespace(returncode=done.exit_code, stdout=done.stdout, stderr=done.stderr)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import shutil
@@ -22,8 +21,8 @@ from typer.testing import CliRunner
 from glotouch_bt import cli
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE
 from glotouch_bt.mission.checkpoint.codec import encode
+from tests.support import fake_cli
 
-FAKE_CLI = Path(__file__).parents[2] / "support" / "fake_cli.py"
 MISSION = """mission: m
 world: container_five
 tree:
@@ -36,15 +35,9 @@ Glotouch = Callable[..., Any]
 
 @pytest.fixture(scope="module")
 def fakes() -> Any:
-    spec = importlib.util.spec_from_file_location("fake_cli", FAKE_CLI)
-    assert spec is not None
-    assert spec.loader is not None
     with pytest.MonkeyPatch.context() as patch:
-        house = importlib.util.module_from_spec(spec)
-        patch.setitem(sys.modules, "fake_cli", house)
-        spec.loader.exec_module(house)
-        house.install_fakes(patch.setattr)
-        yield house
+        fake_cli.install_fakes(patch.setattr)
+        yield fake_cli
 
 
 def glotouch(*words: object) -> Any:

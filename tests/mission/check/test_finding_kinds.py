@@ -49,7 +49,6 @@ EXAMPLES = {
     "written_twice": HEAD + "tree:\n  - parallel: [tool_pickup, {tool_calibrate: {out: {tool: tool}}}]\n",
     "unknown_state": HEAD.replace("[probe, empty]", "[probe, empti]") + "tree: [tool_pickup]\n",
     "unknown_resource": HEAD.replace("hand", "foot") + "tree: [tool_pickup]\n",
-    "renamed": HEAD + "tree: [bare_hand, guarded_sweep, {orbit_probe: {least_contacts: 4}}]\n",
     "input_never_written": HEAD + "tree: [bare_hand, guarded_sweep, orbit_probe, {match: {target: apple}}]\n",
     "not_put_back": "mission: m\nworld: worlds/container_five.yaml\ntree: [tool_pickup]\n",
     "identical_objects": WORLD.replace("nowhere", "twins").replace("[bare_hand]", "{match: {target: $t}}")

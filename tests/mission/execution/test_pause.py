@@ -57,14 +57,6 @@ class AtTick(Control):
         return ticks >= self._tick and now_s < self._until_s
 
 
-@pytest.fixture
-def go(load: Callable[..., Any], robot: Any, no_arm: Any) -> Callable[..., Outcome]:
-    def run(tree: str, record: Any = None, **options: Any) -> Outcome:
-        return run_mission(load(tree), robot, record or NullRecord(), make_arm=no_arm, **options)
-
-    return run
-
-
 def test_a_paused_tree_is_not_ticked_and_goes_on_where_it_was(go: Any, log: list[str]) -> None:
     record = Events()
     outcome = go("  - act: {script: RRRRRRRRRRRRRRRRRRRRS}\n", record, control=AtTick(5, 3.0))

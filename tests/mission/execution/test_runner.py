@@ -5,12 +5,10 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from glotouch_bt.mission.execution.runner import Outcome, run_mission
 from glotouch_bt.mission.record.run_summary import NullRecord
 from glotouch_bt.robot import BackendError, SafetyStop
 
@@ -33,14 +31,6 @@ class ListRecord(NullRecord):
 
     def port(self, stamp_s: float, key: str, value: object) -> None:
         self.ports.append((stamp_s, key, value))
-
-
-@pytest.fixture
-def go(load: Callable[..., Any], robot: Any, no_arm: Any) -> Callable[..., Outcome]:
-    def run(tree: str, record: Any = None, **options: Any) -> Outcome:
-        return run_mission(load(tree), robot, record or NullRecord(), make_arm=no_arm, **options)
-
-    return run
 
 
 def test_success_is_recorded_tick_by_tick(go: Any, robot: Any) -> None:

@@ -1,4 +1,4 @@
-"""Unknown names hide nothing below them; old names of parameters still load."""
+"""Unknown names hide nothing below them."""
 
 from __future__ import annotations
 
@@ -52,20 +52,3 @@ def test_a_parameter_used_only_below_an_unknown_name_is_used(found_in: Found) ->
         + "parameters:\n  n: {type: int, default: 5}\ntree:\n  Sequense: [{guarded_sweep: {expected_objects: $n}}]\n"
     )
     assert "unused_parameter" not in {f.code for f in found_in(text)}
-
-
-def test_renamed__an_old_name_loads_with_a_warning(found_in: Found) -> None:
-    text = HEAD + "tree: [bare_hand, guarded_sweep, {orbit_probe: {least_contacts: 4, most_contacts: 6}}]\n"
-    assert [(f.code, f.severity) for f in found_in(text)] == [("renamed", "warning")] * 2
-    assert "now called 'min_contacts'" in found_in(text)[0].what
-
-
-def test_renamed__an_old_setting_of_a_node_loads_with_a_warning(found_in: Found) -> None:
-    loop = "{for_each: {items: candidates, item: candidate, least_first: quality, do: touch_top}}"
-    found = found_in(f"{HEAD}tree: [bare_hand, guarded_sweep, orbit_probe, {loop}]\n")
-    assert [f.code for f in found] == ["renamed"]
-
-
-def test_an_old_name_beside_the_new_one_is_unknown(found_in: Found) -> None:
-    text = HEAD + "tree: [bare_hand, guarded_sweep, {orbit_probe: {least_contacts: 4, min_contacts: 5}}]\n"
-    assert [f.code for f in found_in(text)] == ["unknown_parameter"]

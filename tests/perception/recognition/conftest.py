@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trimesh
 
+from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot.scene.meshes import Mesh
 
 
@@ -52,3 +54,24 @@ def solids():
     return SimpleNamespace(
         as_mesh=as_mesh, box=box, cylinder=cylinder, sphere=sphere, cone=cone, moved=moved, refined=refined
     )
+
+
+@pytest.fixture(scope="module")
+def meshes(solids):
+    """Five solids that touch tells apart."""
+    return [
+        solids.cylinder(0.025, 0.070),
+        solids.cone(0.032, 0.080),
+        solids.box(0.080, 0.040, 0.060),
+        solids.box(0.060, 0.045, 0.060),
+        solids.sphere(0.032),
+    ]
+
+
+def changed(touchset: TouchSet, **layer) -> TouchSet:
+    """The touches with other values in every layer: name = function of the layer."""
+    sequences = tuple(
+        replace(s, layers=tuple(replace(l, **{k: v(l) for k, v in layer.items()}) for l in s.layers))
+        for s in touchset.sequences
+    )
+    return replace(touchset, sequences=sequences)

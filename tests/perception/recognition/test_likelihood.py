@@ -17,6 +17,7 @@ from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParam
 from glotouch_bt.perception.recognition.likelihood.posterior import log_ratio_to_others, probabilities, ratios
 from glotouch_bt.perception.touch import TouchSequence, TouchSet
 from glotouch_bt.robot import ParamError
+from tests.perception.recognition.conftest import changed
 from tests.support.acquisition import HARSH, IDEAL, NOMINAL, acquire
 
 likelihood = MATCHERS["likelihood"]
@@ -26,29 +27,10 @@ BY_OUTLINE = 1 / (1 + PRIOR.twin * PRIOR.prior_absent / (1 - PRIOR.prior_absent)
 """Largest probability of one candidate without closures: a twin may have the same outline and height."""
 
 
-@pytest.fixture(scope="module")
-def meshes(solids):
-    return [
-        solids.cylinder(0.025, 0.070),
-        solids.cone(0.032, 0.080),
-        solids.box(0.080, 0.040, 0.060),
-        solids.box(0.060, 0.045, 0.060),
-        solids.sphere(0.032),
-    ]
-
-
 def touched(mesh, disturbance, seed: int, index: int = 0):
     rng = np.random.default_rng(seed)
     pose = (rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1), rng.uniform(-np.pi, np.pi))
     return acquire(mesh, pose, disturbance, rng, index)
-
-
-def changed(touchset, **layer):
-    sequences = tuple(
-        replace(s, layers=tuple(replace(l, **{k: v(l) for k, v in layer.items()}) for l in s.layers))
-        for s in touchset.sequences
-    )
-    return replace(touchset, sequences=sequences)
 
 
 def ratio(mesh, touchset) -> float:

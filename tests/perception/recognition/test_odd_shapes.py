@@ -1,10 +1,8 @@
-"""Recognition of the stand-in shapes of tests/shapes.py: nothing may lean on the shipped five."""
+"""Recognition of the stand-in shapes of tests/support/shapes.py: nothing may lean on the shipped five."""
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,17 +11,14 @@ from glotouch_bt.perception.recognition import MATCHERS, TargetModel
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
 from glotouch_bt.perception.recognition.likelihood.scalars import height_ratio
 from glotouch_bt.robot.scene.meshes import load_mesh
+from tests.support import shapes
 from tests.support.acquisition import IDEAL, acquire
 
-SHAPES = Path(__file__).parents[2] / "support" / "shapes.py"
 POSE = (0.03, -0.02, 0.7)
 
 
 @pytest.fixture(scope="module")
 def meshes(tmp_path_factory: pytest.TempPathFactory):
-    spec = importlib.util.spec_from_file_location("stand_in_shapes", SHAPES)
-    shapes = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(shapes)
     folder = tmp_path_factory.mktemp("stl")
     names = ["cup", "l_block", "plate", "mushroom", "star", "disc", "wide"]
     shapes.write(folder, names)

@@ -37,8 +37,8 @@ class LikelihoodParams:
         relief_outlier: Probability of an outlier relief.
         relief_poses: Number of likely poses at which the relief is predicted.
         height_sd_m: Standard deviation of the measured top.
-        lean_rad: Mean lean of an object that stands on an uneven base, exponentially distributed. Source: REALISM, 0 to
-            3 deg, at most 8 deg.
+        lean_rad: Mean lean of an object that stands on an uneven base, exponentially distributed. Source: 0 to 3 deg
+            in conditions/realistic.yaml, 0 to 8 deg in strong.yaml.
         height_lower: Probability that a lower point of a wholly traced object was measured as its top. Source: ours; in
             recorded realistic missions nearly all low tops were those of partly traced objects.
         contour_sd_m: Standard deviation of a contour's side, besides that of the traces.

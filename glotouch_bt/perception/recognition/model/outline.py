@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     import trimesh
 
 TIP_RADIUS_M = 0.006
-"""Radius of the probe's ball. Source: CONDITIONS."""
+"""Radius of the probe's ball. Source: `robot.Probe`."""
 SHAFT_RADIUS_M = 0.004
-"""Radius of the probe's shaft. Source: CONDITIONS."""
+"""Radius of the probe's shaft. Source: `robot.Probe`."""
 SHAFT_M = 0.100
-"""Length of the lower part of the shaft. Source: CONDITIONS."""
+"""Length of the lower part of the shaft. Source: ours; a whole `robot.Probe` is 120 mm long."""
 SENSING_M = 0.018
 """Height of the ball's centre during a trace."""
 TRACES = 10

@@ -25,11 +25,11 @@ class PadSpec:
     """One gel pad and the gel law k x / (1 - (x / limit)^2), pressure in Pa at indentation x.
 
     Attributes:
-        window_m: (width along x_P, length along z_P) of the gel; CONDITIONS.
+        window_m: (width along x_P, length along z_P) of the gel. Source: rizon4.yaml.
         shape: (rows, cols) of the depth maps.
-        depth_m: Maximum measured indentation. Source: CONDITIONS.
-        stiffness_N_m3: k. Source: 0.2 N/mm3, assumed in SIMULATION A4.
-        limit_m: Indentation at which the gel becomes rigid. Source: SIMULATION A4.
+        depth_m: Maximum measured indentation. Source: rizon4.yaml.
+        stiffness_N_m3: k. Source: 0.2 N/mm3, assumed.
+        limit_m: Indentation at which the gel becomes rigid. Source: assumed.
         force_N: Jaw force of the tables.
     """
 
@@ -60,7 +60,7 @@ def gel_shift(
         pad: The gel.
 
     Returns:
-        (..., 1) s in metres, at most `pad.depth_m`. Source: SIMULATION A4, recipe C (bisection, monotone in s).
+        (..., 1) s in metres, at most `pad.depth_m`: by bisection, because the sum is monotone in s.
     """
     lo = np.zeros((*heights_m.shape[:-1], 1), dtype=heights_m.dtype)
     hi = np.full_like(lo, pad.depth_m)

@@ -1,4 +1,4 @@
-"""Simulated touches of side images: pad images and patch statistics (RECOGNITION, ill-defined point 1)."""
+"""Simulated touches of side images: pad images and patch statistics."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """Zero error of the jaws, measured on an object of known width: the probe's handle.
 
-A gripper's zero has a constant error (CONDITIONS: 0.4 mm nominal, 1 mm harsh) that shifts every measured width. A flat
-handle of width w that indents the gels by d_L and d_R is held at a true aperture of w - d_L - d_R.
+A gripper's zero has a constant error (at most 0.4 mm in conditions/nominal.yaml, 1 mm in harsh.yaml) that shifts every
+measured width. A flat handle of width w that indents the gels by d_L and d_R is held at a true aperture of
+w - d_L - d_R.
 """
 
 from __future__ import annotations

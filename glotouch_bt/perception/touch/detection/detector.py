@@ -27,7 +27,8 @@ from glotouch_bt.robot import Array, Observation, ParamError, Pose, frozen_array
 HISTORY_BLOCKS = 10
 """Number of blocks kept to date an onset: 100 ms at 100 Hz; the last third may belong to the contact."""
 DRIFT_S = 2.0
-"""Time constant of the baseline while a paused motion stands: slower changes are drift (harsh CONDITIONS: 0.02 N)."""
+"""Time constant of the baseline while a paused motion stands: slower changes are drift (0.02 N in
+conditions/harsh.yaml)."""
 
 SUSTAINED_SIGMAS_RATIO = 1.5
 """Standard deviations of a force that lasts, over those of the fast rule: what lasts is not white noise. Source: ours;

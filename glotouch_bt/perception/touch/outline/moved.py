@@ -10,7 +10,6 @@ import numpy as np
 from glotouch_bt.perception.touch.outline.belief import infer_outline
 from glotouch_bt.perception.touch.outline.mixture import OutlineBelief
 from glotouch_bt.perception.touch.values import Contact
-from glotouch_bt.robot import Array
 
 MOVED_PRIOR = 0.005
 """Prior probability of an unobserved motion between two given contacts."""
@@ -26,7 +25,7 @@ touched had moved by 0.2 to 3.3 mm in the whole mission."""
 
 
 def infer_outline_from_contacts(
-    contacts: Sequence[Contact], tip_radius_m: float, free_K_m: Array | None = None, *, outliers: int = 0
+    contacts: Sequence[Contact], tip_radius_m: float, *, outliers: int = 0
 ) -> OutlineBelief:
     """Infer the outline from contacts in order of time, with the displacement of the object by each contact."""
     return infer_outline(
@@ -35,7 +34,6 @@ def infer_outline_from_contacts(
         approach_K=np.array([c.approach_K[:2] for c in contacts]),
         reaction_K=np.array([c.reaction_K[:2] for c in contacts]),
         pushed_K_m=np.array([c.pushed_K_m for c in contacts]),
-        free_K_m=free_K_m,
         outliers=outliers,
     )
 

@@ -31,6 +31,14 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return user_folder()
 
 
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Lines that were logged."""
+    lines: list[str] = []
+    monkeypatch.setattr(room._log, "warning", lines.append)
+    return lines
+
+
 def as_mesh(solid: trimesh.Trimesh, folder: Path, name: str) -> Mesh:
     path = folder / f"{name}.stl"
     solid.export(path)
@@ -72,7 +80,7 @@ def union_volume_m3(parts: tuple[np.ndarray, ...], lower: np.ndarray, upper: np.
 )
 def test_notches_and_holes_stay_open(make, open_points_m, tmp_path: Path) -> None:
     mesh = as_mesh(make(), tmp_path, "shape")
-    hulls = load_hulls(mesh).vertices
+    hulls = load_hulls(mesh)
     assert depth_inside_m(np.array(open_points_m), hulls).max() < 0  # outside every hull
     assert depth_inside_m(mesh.vertices_m, hulls).min() > -2e-4  # every corner is kept
     lower, upper = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
@@ -81,19 +89,19 @@ def test_notches_and_holes_stay_open(make, open_points_m, tmp_path: Path) -> Non
     assert 2 <= len(hulls) <= 32
 
 
-def test_second_load_equals_the_first_byte_for_byte(tmp_path: Path, cache: Path) -> None:
+def test_second_load_equals_the_first_byte_for_byte(tmp_path: Path, cache: Path, said: list[str]) -> None:
     mesh = as_mesh(l_shape(), tmp_path, "shape")
-    said: list[str] = []
-    first = load_hulls(mesh, said.append)
+    first = load_hulls(mesh)
     assert any("cutting" in line for line in said)
     file = cache / f"{mesh.digest}.npz"
-    stored, said_again = file.read_bytes(), []
-    second = load_hulls(mesh, said_again.append)
-    assert said_again == []
-    assert [h.tobytes() for h in first.vertices] == [h.tobytes() for h in second.vertices]
+    stored = file.read_bytes()
+    said.clear()
+    second = load_hulls(mesh)
+    assert said == []
+    assert [h.tobytes() for h in first] == [h.tobytes() for h in second]
     assert file.read_bytes() == stored
     assert [p.name for p in cache.iterdir() if not p.name.endswith(".lock")] == [file.name]  # no temporary left
-    assert not first.vertices[0].flags.writeable
+    assert not first[0].flags.writeable
 
 
 def test_cutting_is_deterministic(tmp_path: Path) -> None:
@@ -107,7 +115,7 @@ def box(tmp_path: Path, size: float = 0.04) -> Mesh:
 
 def test_a_convex_solid_is_one_hull_of_its_own_corners(tmp_path: Path) -> None:
     mesh = box(tmp_path)
-    (hull,) = load_hulls(mesh).vertices
+    (hull,) = load_hulls(mesh)
     assert len(hull) == 8
     assert surface_distance_m(hull, mesh).max() < 1e-7
 
@@ -124,12 +132,12 @@ DAMAGE = ("truncated", "garbage", "empty", "other key", "wrong counts", "not fin
 
 @pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_file_is_replaced(damage: str, tmp_path: Path, cache: Path) -> None:
+def test_a_damaged_file_is_replaced(damage: str, tmp_path: Path, cache: Path, said: list[str]) -> None:
     mesh = box(tmp_path)
     load_hulls(mesh)
     file = cache / f"{mesh.digest}.npz"
     good = file.read_bytes()
-    hull = load_hulls(mesh).vertices[0]
+    hull = load_hulls(mesh)[0]
     match damage:
         case "truncated":
             file.write_bytes(good[: len(good) // 2])
@@ -156,9 +164,8 @@ def test_a_damaged_file_is_replaced(damage: str, tmp_path: Path, cache: Path) ->
         case "folder":
             file.unlink()
             file.mkdir()
-    said: list[str] = []
-    healed = load_hulls(mesh, said.append)
-    assert healed.vertices[0].tobytes() == hull.tobytes()
+    healed = load_hulls(mesh)
+    assert healed[0].tobytes() == hull.tobytes()
     if damage != "folder":
         assert file.read_bytes() == good
     else:
@@ -183,18 +190,21 @@ def test_another_shape_has_another_file(tmp_path: Path, cache: Path) -> None:
     assert {p.stem for p in cache.glob("*.npz")} == {first.digest, second.digest}
 
 
-def test_failed_cutting_falls_back_to_coarse_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_cutting_falls_back_to_coarse_parts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: list[str]
+) -> None:
     mesh = as_mesh(l_shape(), tmp_path, "shape")
     monkeypatch.setattr(room, "FINE", room.Attempt({"threshold": "not a number"}, 30.0))
-    said: list[str] = []
-    hulls = load_hulls(mesh, said.append).vertices
+    hulls = load_hulls(mesh)
     assert any("CoACD ended with code" in line for line in said)
     assert "coarse" in said[-1]
     assert depth_inside_m(np.array([[0.045, 0.045, 0.015]]), hulls)[0] < 0
     assert "coarse" in room.read_parts(user_folder() / f"{mesh.digest}.npz", KEY).note
 
 
-def test_too_slow_cutting_falls_back_to_the_convex_hull(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_slow_cutting_falls_back_to_the_convex_hull(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: list[str]
+) -> None:
     mesh = as_mesh(l_shape(), tmp_path, "shape")
     started: list[subprocess.Popen] = []
     popen = subprocess.Popen
@@ -206,8 +216,7 @@ def test_too_slow_cutting_falls_back_to_the_convex_hull(tmp_path: Path, monkeypa
     monkeypatch.setattr(subprocess, "Popen", spy)
     for name in ("FINE", "COARSE"):
         monkeypatch.setattr(room, name, room.Attempt(getattr(room, name).parameters, 0.01))
-    said: list[str] = []
-    hulls = load_hulls(mesh, said.append).vertices
+    hulls = load_hulls(mesh)
     assert len(hulls) == 1
     assert any("not finished after" in line for line in said)
     assert "plain convex hull" in said[-1]
@@ -325,7 +334,7 @@ def mushroom() -> trimesh.Trimesh:
 
 def test_an_overhang_stays_open(tmp_path: Path) -> None:
     mesh = as_mesh(mushroom(), tmp_path, "mushroom")
-    hulls = load_hulls(mesh).vertices
+    hulls = load_hulls(mesh)
     below_the_cap = np.array([(0.025, 0.0, 0.035), (0.0, -0.02, 0.025), (-0.016, 0.0, 0.02)])
     assert depth_inside_m(below_the_cap, hulls).max() < -1e-3
     assert np.percentile(bulge_m(mesh, hulls, 3000), 95) < 1e-3
@@ -334,7 +343,7 @@ def test_an_overhang_stays_open(tmp_path: Path) -> None:
 def test_overlapping_shells_are_cut_one_by_one(tmp_path: Path) -> None:
     boxes = [trimesh.creation.box(size) for size in ((0.07, 0.02, 0.04), (0.02, 0.06, 0.03), (0.01, 0.01, 0.01))]
     boxes[2].invert()  # a hollow in the middle
-    hulls = load_hulls(as_mesh(trimesh.util.concatenate(boxes), tmp_path, "cross")).vertices
+    hulls = load_hulls(as_mesh(trimesh.util.concatenate(boxes), tmp_path, "cross"))
     found = sorted(np.ptp(h, axis=0).round(5).tolist() for h in hulls)
     assert found == [pytest.approx(size, abs=2e-5) for size in ([0.02, 0.06, 0.03], [0.07, 0.02, 0.04])]
 

@@ -16,20 +16,10 @@ from glotouch_bt.perception.recognition.paper.observation import read_observatio
 from glotouch_bt.perception.recognition.paper.widths import Hypotheses, predicted_widths, width_tables
 from glotouch_bt.perception.touch import TouchSequence, TouchSet
 from glotouch_bt.robot import ParamError
+from tests.perception.recognition.conftest import changed
 from tests.support.acquisition import IDEAL, NOMINAL, acquire
 
 FULL = PaperParams()
-
-
-@pytest.fixture(scope="module")
-def meshes(solids):
-    return [
-        solids.cylinder(0.025, 0.070),
-        solids.cone(0.032, 0.080),
-        solids.box(0.080, 0.040, 0.060),
-        solids.box(0.060, 0.045, 0.060),
-        solids.sphere(0.032),
-    ]
 
 
 @pytest.fixture(scope="module")
@@ -46,14 +36,6 @@ def touched(mesh, disturbance, seed: int, index: int = 0) -> TouchSet:
     rng = np.random.default_rng(seed)
     pose = (rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1), rng.uniform(-np.pi, np.pi))
     return acquire(mesh, pose, disturbance, rng, index)[0]
-
-
-def changed(touchset: TouchSet, **layer) -> TouchSet:
-    sequences = tuple(
-        replace(s, layers=tuple(replace(l, **{k: v(l) for k, v in layer.items()}) for l in s.layers))
-        for s in touchset.sequences
-    )
-    return replace(touchset, sequences=sequences)
 
 
 def carried(touchset: TouchSet, angle: float, shift: np.ndarray) -> TouchSet:

@@ -9,22 +9,14 @@ from glotouch_bt.perception.touch import current_tips, infer_outline, signed_dis
 from glotouch_bt.perception.touch.outline.deviation import infer_posteriors
 from glotouch_bt.perception.touch.outline.primitives import Touches, circle, rounded, wrapped
 from glotouch_bt.robot import ParamError
+from tests.perception.touch.outline.conftest import rectangle, turned
 
 R = 0.006
-
-
-def rectangle(long, short):
-    return 0.5 * np.array([[long, short], [-long, short], [-long, -short], [long, -short]])
 
 
 def disc(radius):
     a = np.linspace(0, 2 * np.pi, 240, endpoint=False)
     return radius * np.c_[np.cos(a), np.sin(a)]
-
-
-def turned(discs, angle, shift):
-    c, s = np.cos(angle), np.sin(angle)
-    return discs[0] @ np.array([[c, s], [-s, c]]) + shift, discs[1]
 
 
 def explore(bench, discs, rng, contacts, noise=3e-4):

@@ -7,6 +7,7 @@ from scipy.optimize import least_squares, minimize
 from glotouch_bt.perception import touch
 from glotouch_bt.perception.touch import Contour, contour_quality, fit_contour, fit_kind, signed_distance
 from glotouch_bt.robot import ParamError
+from tests.perception.touch.outline.conftest import rectangle, turned
 
 R = 0.006
 
@@ -14,15 +15,6 @@ R = 0.006
 def ring(n, radius, centre=(0.0, 0.0), turn=0.0):
     a = turn + np.arange(n) * 2 * np.pi / n
     return np.asarray(centre) + radius * np.c_[np.cos(a), np.sin(a)]
-
-
-def rectangle(long, short):
-    return 0.5 * np.array([[long, short], [-long, short], [-long, -short], [long, -short]])
-
-
-def turned(discs, angle, shift=(0.0, 0.0)):
-    c, s = np.cos(angle), np.sin(angle)
-    return discs[0] @ np.array([[c, s], [-s, c]]) + shift, discs[1]
 
 
 def angle_between(a, b, period):

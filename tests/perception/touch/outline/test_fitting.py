@@ -23,16 +23,10 @@ from glotouch_bt.perception.touch.outline.primitives import (
     rectangle,
     rounded,
 )
+from tests.perception.touch.outline.conftest import random_params
 
 R = 0.006
 FREE = {circle: [0, 1, 3], rectangle: [0, 1, 2, 3, 4], rounded: [0, 1, 2, 3, 4, 5]}
-
-
-def random_params(shape, rng):
-    place, half = rng.normal(0, 0.1, 2), rng.uniform(0.010, 0.050, 2)
-    if shape is circle:
-        return np.array([*place, half[0]])
-    return np.array([*place, rng.uniform(-3, 3), *half, *([rng.uniform(0, 0.008)] if shape is rounded else [])])
 
 
 def touched(p, shape, rng, k=9):

@@ -2,15 +2,9 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.touch.outline.primitives import circle, ray_m, rectangle, rounded, wrapped
+from tests.perception.touch.outline.conftest import random_params
 
 R = 0.006
-
-
-def random_params(shape, rng):
-    place, half = rng.normal(0, 0.1, 2), rng.uniform(0.010, 0.050, 2)
-    if shape is circle:
-        return np.array([*place, half[0]])
-    return np.array([*place, rng.uniform(-3, 3), *half, *([rng.uniform(0, 0.008)] if shape is rounded else [])])
 
 
 @pytest.mark.parametrize("shape", [circle, rectangle, rounded])
