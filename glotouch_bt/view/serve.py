@@ -54,6 +54,8 @@ def view_run(
     from glotouch_bt.view.watch import RunWatch
 
     require_viser()
+    if folder.is_file():
+        raise BadInput(f"{folder}: give the run's folder, not a file in it")
     with RecordReader(folder, growing=True) as reader:  # a broken record is an error here, and a sentence later
         reader.read()
         if not reader.record.run:

@@ -89,7 +89,12 @@ BAD = [
     (["check", "nothing"], "unknown mission"),
     (["skills", "squeez"], "did you mean 'squeeze'"),
     (["tree", "nothing"], "unknown mission"),
-    (["report", "gone"], "no run here"),
+    (["report", "gone"], "no run here; give the folder that `glotouch run` printed"),
+    (["resume", "gone"], "no run here"),
+    (["missions", "explore"], "is a shipped subtree, not a mission"),
+    (["missions", "close_five"], "is a shipped world, not a mission"),
+    (["faults", "dropped_probe"], "run it with --faults dropped_probe"),
+    (["run", "retrieve", "--world", "clutter_ten"], "--set target=NAME"),
     (["run"], "MISSION"),
     (["run", "retrieve", "--nonsense"], "No such option"),
 ]

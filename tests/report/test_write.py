@@ -124,9 +124,16 @@ def test_the_scene_speaks_of_a_target_only_if_the_mission_has_one(
 
 
 def test_the_log_leaves_out_what_is_none(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "run.mcap", {}) as record:
+    with Recorder(tmp_path / "run.mcap", {"mission": "m"}) as record:
         record.event("tool", 1.0, {"held": False, "error": None, "force_N": 3.25})
     assert "<td>not held, force_N = 3.25</td>" in write_report(tmp_path).read_text()
+
+
+def test_a_record_without_a_run_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").write_bytes(b"hello")
+    with pytest.raises(BadInput, match="nothing to report"):
+        write_report(tmp_path)
+    assert not (tmp_path / "report.html").exists()
 
 
 def test_a_mission_that_explored_nothing_has_no_map(tmp_path: Path) -> None:
