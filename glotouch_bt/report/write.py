@@ -33,7 +33,7 @@ def write_report(run_dir: Path, objects: Path | None = None) -> Path:
     require_plain(run_dir, (REPORT_NAME, f".{REPORT_NAME}.part"))
     target = run_dir / REPORT_NAME
     record = read_run(run_dir)
-    if not record.run:
+    if not (record.run or record.events or record.ticks):
         raise BadInput(f"{record.path}: is empty or cut off in its first bytes; there is nothing to report")
     record.objects = objects
     text = render(record)
