@@ -237,7 +237,11 @@ def refused(*words: object) -> str:
 
 def test_what_cannot_be_resumed_is_one_message(twin: Path, tmp_path: Path) -> None:
     assert "no run here" in refused(tmp_path / "nowhere")
-    assert "no checkpoint here" in refused(tmp_path)
+    assert "no run here" in refused(tmp_path)
+    recorded = tmp_path / "recorded"
+    recorded.mkdir()
+    (recorded / "run.mcap").write_bytes(b"")
+    assert "no checkpoint here" in refused(recorded)
     assert "did you mean 'third'" in refused(twin, "--from", "thrid", "--out", tmp_path / "x")
     copy = tmp_path / "copy"
     copy.mkdir()
