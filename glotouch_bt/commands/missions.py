@@ -28,9 +28,9 @@ def missions(
 
     known = shipped("")
     if name is not None and name not in known:
-        for kind in KINDS:
-            if name in shipped(kind):
-                raise BadInput(f"{name!r} is a shipped {KINDS[kind]}, not a mission; its file is {shipped(kind)[name]}")
+        for kind, called in KINDS.items():
+            if path := shipped(kind).get(name):
+                raise BadInput(f"{name!r} is a shipped {called}, not a mission; its file is {path}")
         raise UnknownName("mission", name, known)
     described = [describe_mission(known[n]) for n in ([name] if name else known)]
     if json_:

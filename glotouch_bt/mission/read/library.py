@@ -25,7 +25,7 @@ def shipped_root() -> Path:
 
 
 def shipped(kind: str) -> dict[str, Path]:
-    """Return the shipped files by name; kind is "" (missions), "worlds" or "conditions"."""
+    """Return the shipped files by name; kind is "" (missions) or the name of a folder of shipped files."""
     return {p.stem: p for p in sorted((shipped_root() / kind).glob("*.yaml"))}
 
 

@@ -50,8 +50,8 @@ MAX_NATS = 7.0
 """Log evidence of a contact that a further outline is assumed to reach at most. Source: ours; the upper quartile is
 4.6."""
 LIKELY_NATS = 4.6
-"""Log evidence of a contact that the other part of two overlapping candidates is assumed to reach at most. Source: the
-upper quartile of `MAX_NATS`; fewer divisions are evaluated in full."""
+"""Log evidence of a contact that the other part of two overlapping candidates is assumed to reach at most: fewer
+divisions are evaluated in full. Source: the upper quartile of the contacts of `MAX_NATS`."""
 REDIVIDED_NATS = 5.0
 """Minimum gain of log evidence by which the contacts of two candidates are divided anew. Source: ours."""
 SOLID_STEP_M = 0.005

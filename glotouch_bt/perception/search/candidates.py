@@ -197,7 +197,7 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
 
 
 def separated(admitted: Admitted, radius_m: float, exclusion_m: float) -> Admitted:
-    """Divide the contacts of candidates anew whose outlines overlap, the deepest overlap first: bodies do not overlap.
+    """Divide anew the contacts of candidates whose outlines overlap, the deepest overlap first: bodies do not overlap.
 
     Args:
         admitted: Map and candidates.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,8 @@ from tests.robot.supervision.supervised import (
     with_part,
 )
 
+GUARDS_PAGE = Path(__file__).parents[3] / "docs/explanation/supervision.md"
+
 FATAL: list[tuple[str, Spoil]] = [
     ("not_finite", all_of("wrench_S", 2, np.nan)),
     ("not_finite", all_of("q", 3, np.inf)),
@@ -69,6 +72,7 @@ def test_each_guard_holds_the_arm_within_one_period_and_is_recorded(guard: str, 
     assert device.holds == 1
     assert found[-1].guard == guard
     assert found[-1].fatal
+    assert f"`{guard}`" in GUARDS_PAGE.read_text(), "the page lists every guard"
     assert np.isnan(trip.value.value) or trip.value.value != trip.value.limit
     assert str(trip.value.stamp_s)[:4] in str(trip.value) or trip.value.stamp_s > 0
     # every later cycle holds and raises the same error

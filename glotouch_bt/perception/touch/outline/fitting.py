@@ -37,19 +37,24 @@ SIFT_STEP = 4
 SIFTED = 5
 """Number of starts that continue."""
 LONGEST_M = 0.02
-"""Maximum displacement of a centre in one step of the descent, per axis."""
+"""Maximum displacement of a centre in one step of the descent, per axis. Source: ours."""
 LONGEST_RAD = 0.3
-"""Maximum turn in one step of the descent."""
+"""Maximum turn in one step of the descent. Source: ours."""
 INWARD_COSINE = 0.3
-"""A contact whose face points along the approach by more than this came from inside."""
+"""Cosine between approach and outward normal above which a contact would have come from inside. Source: ours."""
 INWARD_LOSS = 10.0
-"""Loss of such a contact."""
+"""Loss of such a contact, nats. Source: ours."""
+STEPS = 14
+"""Maximum number of steps of the descent. Source: ours."""
+GAIN = 1e-2
+"""Reduction of the loss by a step below which the descent ends. Source: ours; evidence is compared in nats."""
 CIRCLE, RECTANGLE, ROUNDED = 0, 1, 2
+"""Kinds of shapes for the compiled descent."""
 _KIND: dict[Shape, int] = {circle: CIRCLE, rectangle: RECTANGLE, rounded: ROUNDED}
 _COLUMNS: dict[Shape, Sequence[int]] = {circle: (0, 1, 3), rectangle: (0, 1, 2, 3, 4), rounded: (0, 1, 2, 3, 4, 5)}
 
 
-def fit(shape: Shape, touches: Touches, *, steps: int = 14, gain: float = 1e-2) -> tuple[Array, Array]:
+def fit(shape: Shape, touches: Touches, *, steps: int = STEPS, gain: float = GAIN) -> tuple[Array, Array]:
     """Minimise the soft-L1 loss from many starts; return optima (s, p) and losses (s,), best first."""
     starts = _round_starts(touches) if shape is circle else _rectangle_starts(touches)
     params, loss, _ = descend(starts, np.full(len(starts), _KIND[shape]), touches, 0, steps, gain)
@@ -58,12 +63,12 @@ def fit(shape: Shape, touches: Touches, *, steps: int = 14, gain: float = 1e-2) 
     return np.take(params[order], _COLUMNS[shape], axis=1), loss[order]
 
 
-def fit_both(touches: Touches, *, steps: int = 14, gain: float = 1e-2) -> tuple[Array, Array, Array]:
+def fit_both(touches: Touches) -> tuple[Array, Array, Array]:
     """Return the best circle (3,) and the rounded rectangles of `fit`, from one joint descent."""
     rounds, boxes = _round_starts(touches), _rectangle_starts(touches)
     n = len(rounds)
     kinds = np.repeat([CIRCLE, ROUNDED], [n, len(boxes)])
-    params, loss, _ = descend(np.concatenate([rounds, boxes]), kinds, touches, n, steps, gain)
+    params, loss, _ = descend(np.concatenate([rounds, boxes]), kinds, touches, n, STEPS, GAIN)
     order = n + np.argsort(loss[n:], kind="stable")
     order = order[np.isfinite(loss[order])]
     best = params[int(np.argmin(loss[:n]))]

@@ -38,6 +38,7 @@ def can(solids):
 
 @pytest.fixture(scope="module")
 def meshes(solids):
+    """Five solids of which no two have height and outline nearly alike: their touch models come from one handling."""
     return [
         solids.cylinder(0.025, 0.070),
         solids.cone(0.032, 0.080),
