@@ -5,19 +5,16 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from glotouch_bt.mission import split_settings
-from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, CheckpointRow
-from glotouch_bt.mission.read import conditions_of
-from glotouch_bt.robot import BackendError, BadInput, load_backend
-from glotouch_bt.runs.folder import FILM, require_run_folder
-from glotouch_bt.runs.resume_point import mission_of_run, stored_run
-from glotouch_bt.runs.robot_identity import require_same_robot
+from glotouch_bt.mission.checkpoint import CheckpointRow
+from glotouch_bt.robot import BackendError, BadInput
+from glotouch_bt.runs.folder import FILM
+from glotouch_bt.runs.past_worlds import past_worlds
 from glotouch_bt.untrusted import write_file
 
 MOMENTS = 8
@@ -41,31 +38,15 @@ def write_film(folder: Path, objects: Path | None = None, settings: Mapping[str,
             folder cannot be written.
         BackendError: The world cannot be built, or no picture can be taken here.
     """
-    require_run_folder(folder)
-    file = CheckpointFile(folder / CHECKPOINT_FILE)
-    try:
-        run = stored_run(file)
-        request = run["request"]
-        mission = mission_of_run(folder, run, objects)
-        backend = load_backend(request["backend"])
-        asked = split_settings(mission, request["settings"])
-        portable = {n: value for n, value in asked.items() if backend.is_portable(n, value)}
-        options = {**portable, **(settings or {})}
-        conditions = conditions_of(run["conditions"], f"{folder}: conditions")
-        pictures = []
-        with backend.open(mission.world, conditions, request["seed"], options) as robot:
-            require_same_robot(folder, run, robot.description)
-            camera = backend.camera(robot)
-            if camera is None:
-                raise BadInput(f"{folder}: the backend {request['backend']!r} has no camera")
-            for row in moments(file.rows()):
-                world = file.world(row.number)
-                assert world is not None
-                robot.restore(world)
-                jpeg = _jpeg(camera(*(OVERSAMPLED * s for s in SIZE)))
-                pictures.append({"t_s": row.stamp_s, "node": row.node, "status": row.status, "jpeg": jpeg})
-    finally:
-        file.close()
+    pictures = []
+    with past_worlds(folder, objects, settings) as worlds:
+        camera = worlds.backend.camera(worlds.robot)
+        if camera is None:
+            raise BadInput(f"{folder}: the backend {worlds.name!r} has no camera")
+        for row in moments(worlds.rows):
+            worlds.restore(row)
+            jpeg = _jpeg(camera(*(OVERSAMPLED * s for s in SIZE)))
+            pictures.append({"t_s": row.stamp_s, "node": row.node, "status": row.status, "jpeg": jpeg})
     target = folder / FILM
     try:
         write_file(target, json.dumps(pictures).encode())
@@ -76,9 +57,9 @@ def write_film(folder: Path, objects: Path | None = None, settings: Mapping[str,
     return target
 
 
-def moments(rows: list[CheckpointRow]) -> list[CheckpointRow]:
+def moments(rows: Sequence[CheckpointRow]) -> list[CheckpointRow]:
     """Return the last checkpoint after each kind of skill, in the order of time; at most `MOMENTS`, evenly chosen."""
-    last = {r.node.rsplit("/", 1)[-1].rstrip(" 0123456789"): r for r in rows if r.node and r.has_world}
+    last = {r.node.rsplit("/", 1)[-1].rstrip(" 0123456789"): r for r in rows if r.node}
     found = sorted(last.values(), key=lambda r: r.number)
     if len(found) <= MOMENTS:
         return found

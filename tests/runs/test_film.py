@@ -16,12 +16,12 @@ from glotouch_bt.runs import write_film
 from glotouch_bt.runs.film import MOMENTS, moments
 
 
-def row(number: int, node: str, world: bool = True) -> CheckpointRow:
-    return CheckpointRow(number, 1.0 * number, f"m/{node}" if node else "", "SUCCESS", (), {}, None, world)
+def row(number: int, node: str) -> CheckpointRow:
+    return CheckpointRow(number, 1.0 * number, f"m/{node}" if node else "", "SUCCESS", (), {}, None, True)
 
 
 def test_a_moment_follows_the_last_skill_of_each_kind() -> None:
-    rows = [row(0, ""), row(1, "sweep"), row(2, "probe"), row(3, "sweep 2"), row(4, "lift", world=False)]
+    rows = [row(0, ""), row(1, "sweep"), row(2, "probe"), row(3, "sweep 2")]
     assert [r.number for r in moments(rows)] == [2, 3]
 
 

@@ -1,11 +1,9 @@
 """`bench space`: push each object of a box once, or lift each one out. Is it where the map says, and does it stand?
 
 A trial is one layout and one act: the mission finds and measures all objects, then pushes each once (`nudge_each`), or
-lifts each out and sets it down elsewhere (`clear_each`). At the end of the mission every object is compared with the
-truth: its centre with that of its true section at the height of the probe.
-
-If an object toppled or stands elsewhere, the search alone is run again with the same seed (`survey`), which makes the
-same motions up to the acts: what the probe toppled or moved before is counted apart.
+lifts each out and sets it down elsewhere (`clear_each`). After each act the map is compared with the truth: the
+candidate's centre with that of the object's true section at the height of the probe. The true world at that time is in
+the run's checkpoints. What the probe toppled or moved before the act is counted apart.
 """
 
 from __future__ import annotations
@@ -37,15 +35,15 @@ from glotouch_bt.campaign import (
     write_table,
 )
 from glotouch_bt.report import read_run
-from glotouch_bt.runs import RunRequest
+from glotouch_bt.runs import RunRequest, past_worlds
 
 ACTS = ("nudge", "clear")
 """Acts on each object; the mission is the name of the act with `_each`."""
 WITHIN_MM = 5.0
 """Position error that an act may leave. Source: the goal of the project."""
 COLUMNS = (
-    "act", "seed", "candidate", "object", "tried", "done", "cause", "position_error_mm", "moved_mm", "tilt_deg",
-    "toppled", "fallen_before", "error_before_mm", "peak_N", "duration_s", "exit_code", "status", "peak_force_N",
+    "act", "seed", "candidate", "object", "tried", "done", "cause", "position_error_mm", "error_before_mm",
+    "error_at_end_mm", "moved_mm", "tilt_deg", "toppled", "fallen_before", "peak_N", "duration_s", "exit_code", "status", "peak_force_N",
     "sim_time_s", "wall_time_s", "folder",
 )  # fmt: skip
 
@@ -79,11 +77,12 @@ def run_trial(head: Row, request: RunRequest) -> Row:
     row = head | {k: done.result.get(k) for k in COLUMNS if k in done.result}
     row |= {"exit_code": done.exit_code, "cause": "" if done.exit_code == 0 else cause(done.result)}
     record = read_run(done.folder)
-    objects = score(record, sections, head["act"])
-    if any(t.get("toppled") or not within(t) for t in objects):
-        survey = replace(request, mission="survey", out=done.folder.with_name(f"{done.folder.name}-survey"))
-        objects = score(record, sections, head["act"], read_run(launch_trial(survey).folder))
-    return row | {"objects": objects}
+    with past_worlds(done.folder, request.objects, request.settings) as worlds:
+
+        def objects_at(stamp_s: float) -> Any:
+            return worlds.objects([r for r in worlds.rows if r.stamp_s <= stamp_s][-1])
+
+        return row | {"objects": score(record, sections, head["act"], objects_at)}
 
 
 def _failed(head: Row, error: Exception) -> Row:
@@ -130,6 +129,7 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "within": wilson(sum(map(within, done)), len(done)),
         "within_over_worlds": bootstrap_mean(shares),
         "off_before": sum(t.get("error_before_mm", 0.0) > WITHIN_MM for t in done if not within(t)),
+        "within_at_end": wilson(sum(t.get("error_at_end_mm", np.inf) <= WITHIN_MM for t in done), len(done)),
         "position_error_mm": _quantiles(errors),
         "toppled": wilson(sum(bool(t.get("toppled")) for t in things), len(things)),
         "safety_stops": wilson(sum(r.get("exit_code") == 3 for r in rows), len(rows)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -52,7 +52,7 @@ def windows(record: RunRecord) -> list[Window]:
 
 
 def score(
-    record: RunRecord, sections: Mapping[str, FeltSection], act: str, survey: RunRecord | None = None
+    record: RunRecord, sections: Mapping[str, FeltSection], act: str, objects_at: Callable[[float], Any]
 ) -> list[dict[str, Any]]:
     """Return one row for each act of a run.
 
@@ -60,7 +60,7 @@ def score(
         record: The run, with its truth.
         sections: Probe sections of the objects by name.
         act: `nudge` or `clear`.
-        survey: A run of the same seed that ends before the acts; it shows what the probe toppled. None: nothing.
+        objects_at: Returns the true objects at a time of the robot clock, as a list of truth.json.
 
     Raises:
         BadInput: The record has no truth.
@@ -68,28 +68,41 @@ def score(
     pose_B_K = record.pose_B_K
     if record.truth is None or pose_B_K is None:
         raise BadInput(f"{record.path}: no truth is written beside this record; only a simulation can be scored")
-    layout = true_layout(record.truth, pose_B_K, dict(sections))
-    tilts = [tilt_deg(a, b) for a, b in zip(record.truth["start"], record.truth["end"], strict=True)]
-    places = record.of_kind("candidate")
-    whose = owners(places, layout, windows(record)[0].begin_s if windows(record) else np.inf)
-    rows = [_row(record, w, act, places, layout, tilts, whose.get(w.index)) for w in windows(record)]
-    if survey is not None and survey.truth is not None:
-        _attribute(rows, whose, survey, true_layout(survey.truth, pose_B_K, dict(sections)))
+    places, acts = record.of_kind("candidate"), windows(record)
+    if not acts:
+        return []
+    first = objects_at(acts[0].begin_s)
+
+    def layout_of(objects: Any) -> TrueLayout:
+        return true_layout({"start": first, "end": objects}, pose_B_K, dict(sections))
+
+    whose = owners(places, layout_of(record.truth["start"]), acts[0].begin_s)
+    rows = []
+    for window in acts:
+        row = _act(record, window, act)
+        thing = whose.get(window.index)
+        if thing is not None:
+            before, after = (objects_at(t) for t in (window.begin_s, window.end_s))
+            there, then, finally_ = (layout_of(o).centres_K_m[thing] for o in (before, after, record.truth["end"]))
+            row |= {
+                "object": first[thing]["name"],
+                "position_error_mm": _off_mm(places, window.index, window.end_s, then),
+                "error_before_mm": _off_mm(places, window.index, window.begin_s, there),
+                "error_at_end_mm": _off_mm(places, window.index, np.inf, finally_),
+                "moved_mm": 1e3 * float(np.linalg.norm(then - there)),
+                "tilt_deg": tilt_deg(first[thing], record.truth["end"][thing]),
+                "fallen_before": tilt_deg(record.truth["start"][thing], first[thing]) >= TOPPLED_DEG,
+                "peak_N": _peak_N(record, window),
+            }
+            row["toppled"] = row["tilt_deg"] >= TOPPLED_DEG and not row["fallen_before"]
+        rows.append(row)
     return rows
 
 
-def _attribute(rows: Sequence[dict[str, Any]], whose: Mapping[int, int], survey: RunRecord, layout: TrueLayout) -> None:
-    """Add what was so before the acts: objects that the probe had toppled, and the errors of the map."""
-    last = {int(e.data["candidate"]["index"]): e.data["candidate"]["contour"] for e in survey.of_kind("candidate")}
-    for row in rows:
-        thing = whose.get(row["candidate"])
-        if thing is None or row["candidate"] not in last:
-            continue
-        tilt = tilt_deg(survey.truth["start"][thing], survey.truth["end"][thing])
-        row["fallen_before"] = tilt >= TOPPLED_DEG
-        row["toppled"] = row["toppled"] and not row["fallen_before"]
-        mapped = np.array(last[row["candidate"]]["centre_K_m"], dtype=np.float64)
-        row["error_before_mm"] = 1e3 * float(np.linalg.norm(mapped - layout.centres_K_m[thing]))
+def _off_mm(places: Sequence[RecordedEvent], index: int, at_s: float, true_K_m: Array) -> float:
+    """Return the distance of a candidate's place in the map, at a time, from the true one."""
+    known = [e.data["candidate"] for e in places if e.data["candidate"]["index"] == index and e.stamp_s <= at_s]
+    return 1e3 * float(np.linalg.norm(np.array(known[-1]["contour"]["centre_K_m"], dtype=np.float64) - true_K_m))
 
 
 def owners(places: Sequence[RecordedEvent], layout: TrueLayout, until_s: float) -> dict[int, int]:
@@ -103,35 +116,21 @@ def owners(places: Sequence[RecordedEvent], layout: TrueLayout, until_s: float) 
     return {k: i for k, i in zip(traced, whose, strict=True) if i is not None}
 
 
-def _row(
-    record: RunRecord, window: Window, act: str, places: Sequence[RecordedEvent], layout: TrueLayout,
-    tilts: Sequence[float], thing: int | None,
-) -> dict[str, Any]:  # fmt: skip
+def _act(record: RunRecord, window: Window, act: str) -> dict[str, Any]:
+    """Return what the record says about one act."""
     events = [e for e in record.events if window.begin_s < e.stamp_s <= window.end_s]
     failures = [e for e in events if e.kind == "failure"]
     last = max((e.stamp_s for e in events if e.kind == "candidate" and e.data.get("ended") == ENDED[act]), default=None)
     later = [e for e in failures if last is not None and e.stamp_s >= last]
     done = last is not None and not later
-    row: dict[str, Any] = {
+    return {
         "candidate": window.index,
-        "object": "" if thing is None else layout.sections[thing].name,
+        "object": "",
         "tried": last is not None or any(e.kind in ("nudge", "grasp") for e in events),
         "done": done,
         "cause": "" if done else _cause(failures),
         "duration_s": window.end_s - window.begin_s,
     }
-    if thing is None:
-        return row
-    final = [e.data["candidate"] for e in places if int(e.data["candidate"]["index"]) == window.index][-1]
-    estimated = np.array(final["contour"]["centre_K_m"], dtype=np.float64)
-    true = layout.centres_K_m
-    before = replace(layout, after=layout.before).centres_K_m
-    row["position_error_mm"] = 1e3 * float(np.linalg.norm(estimated - true[thing]))
-    row["moved_mm"] = 1e3 * float(np.linalg.norm(true[thing] - before[thing]))
-    row["tilt_deg"] = tilts[thing]
-    row["toppled"] = tilts[thing] >= TOPPLED_DEG
-    row["peak_N"] = _peak_N(record, window)
-    return row
 
 
 def _cause(failures: Sequence[RecordedEvent]) -> str:

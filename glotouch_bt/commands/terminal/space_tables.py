@@ -27,9 +27,10 @@ def print_space(summary: dict[str, Any], folder: Path) -> None:
     rows = [
         ("objects moved as asked", *(rate(c["done"]) for c in columns)),
         ("the same, of those that were touched", *(rate(c["done_of_tried"]) for c in columns)),
-        (f"within {summary['within_mm']:g} mm of the map", *(rate(c["within"]) for c in columns)),
+        (f"within {summary['within_mm']:g} mm of the map after the act", *(rate(c["within"]) for c in columns)),
         ("the same, interval over layouts", *(over_worlds(c["within_over_worlds"]) for c in columns)),
         ("of the others, as far off before", *(str(c["off_before"]) for c in columns)),
+        ("within, at the end of the mission", *(rate(c["within_at_end"]) for c in columns)),
         ("position error, mm: median, 95 %, largest", *(spread(c["position_error_mm"]) for c in columns)),
         ("toppled", *(rate(c["toppled"]) for c in columns)),
         ("fallen before, not counted", *(str(c["fallen_before"]) for c in columns)),

@@ -35,7 +35,7 @@ def placed(stamp_s: float, x_m: float, ended: str) -> RecordedEvent:
     return RecordedEvent(stamp_s, "candidate", {"candidate": {"index": 0, "contour": contour}, "ended": ended})
 
 
-def run(*events: RecordedEvent, end_m: float = 0.03, quat: list[float] = UP) -> RunRecord:
+def run(*events: RecordedEvent, end_m: float = 0.03) -> RunRecord:
     """One object of which the probe section is centred in its frame; it was to be moved from 10 s to 20 s."""
     container = {"pose_B_K": {"position_m": [0.0, 0.0, 0.0], "quat": UP}}
     record = RunRecord(Path("run"), run={"container": container})
@@ -45,7 +45,7 @@ def run(*events: RecordedEvent, end_m: float = 0.03, quat: list[float] = UP) -> 
         Tick(20.0, "m/each/object 0/else", "RUNNING", "SUCCESS"),
     ]
     record.events = [placed(5.0, 0.001, "traced"), *events]
-    record.truth = {"start": [item(0.0)], "end": [item(end_m, quat)]}
+    record.truth = {"start": [item(0.0)], "end": [item(end_m)]}
     record.samples = {"stamp_s": np.array([9.0, 12.0, 21.0]), "force_S_N": np.array([[9, 0, 0], [0, 3, 4], [9, 0, 0]])}
     return record
 
@@ -54,34 +54,52 @@ SECTIONS: Any = {"thing": SimpleNamespace(name="thing", centre_m=np.zeros(2))}
 FAILED = RecordedEvent(15.0, "failure", {"node": "nudge 3", "code": "blocked"})
 
 
-def test_the_error_is_the_distance_of_the_last_known_place_from_the_true_one() -> None:
-    (row,) = score(run(placed(15.0, 0.028, "pushed"), end_m=0.03), SECTIONS, "nudge")
+def scored(
+    record: RunRecord, before_m: float = 0.0, after_m: float = 0.03, quat: list[float] | None = None
+) -> dict[str, Any]:
+    """Return the row of the only act; the object stood there before and after it, and was turned before it."""
+    states = {10.0: [item(before_m, quat or UP)], 20.0: [item(after_m, quat or UP)]}
+    (row,) = score(record, SECTIONS, "nudge", states.__getitem__)
+    return row
+
+
+def test_the_error_is_the_distance_of_the_place_in_the_map_from_the_true_one_at_that_time() -> None:
+    later = placed(30.0, 0.05, "pushed")
+    row = scored(run(placed(15.0, 0.028, "pushed"), later, end_m=0.06), before_m=0.005)
     assert (row["done"], row["tried"], row["cause"], row["object"]) == (True, True, "", "thing")
+    assert row["error_before_mm"] == pytest.approx(4.0)
     assert row["position_error_mm"] == pytest.approx(2.0)
-    assert row["moved_mm"] == pytest.approx(30.0)
+    assert row["error_at_end_mm"] == pytest.approx(10.0)
+    assert row["moved_mm"] == pytest.approx(25.0)
     assert row["peak_N"] == pytest.approx(5.0)
     assert not row["toppled"]
 
 
 def test_a_push_that_failed_is_not_done_and_has_its_cause() -> None:
-    (row,) = score(run(placed(15.0, 0.01, "pushed"), FAILED), SECTIONS, "nudge")
+    row = scored(run(placed(15.0, 0.01, "pushed"), FAILED))
     assert (row["done"], row["tried"], row["cause"]) == (False, True, "nudge: blocked")
-    (row,) = score(run(FAILED), SECTIONS, "nudge")
+    row = scored(run(FAILED))
     assert (row["done"], row["tried"]) == (False, False)
 
 
 def test_what_ended_as_an_act_began_belongs_to_the_act_before() -> None:
-    (row,) = score(run(placed(10.0, 0.01, "pushed"), FAILED), SECTIONS, "nudge")
+    row = scored(run(placed(10.0, 0.01, "pushed"), FAILED))
     assert (row["done"], row["tried"]) == (False, False)
 
 
 def test_what_the_probe_toppled_is_not_counted_as_toppled_by_the_act() -> None:
-    fallen = run(placed(15.0, 0.028, "pushed"), quat=turned(90.0, 0))
-    assert score(fallen, SECTIONS, "nudge")[0]["toppled"]
-    (row,) = score(fallen, SECTIONS, "nudge", survey=fallen)
+    record = run(placed(15.0, 0.028, "pushed"))
+    record.truth["end"] = [item(0.03, turned(90.0, 0))]
+    row = scored(record)
+    assert (row["toppled"], row["fallen_before"]) == (True, False)
+    row = scored(record, quat=turned(90.0, 0))
     assert (row["toppled"], row["fallen_before"]) == (False, True)
-    assert row["error_before_mm"] == pytest.approx(2.0)
-    assert score(fallen, SECTIONS, "nudge", survey=run())[0]["toppled"]
+
+
+def test_a_mission_that_ended_before_the_first_act_has_no_row() -> None:
+    record = run()
+    record.ticks = []
+    assert score(record, SECTIONS, "nudge", lambda _: []) == []
 
 
 def test_an_act_that_did_not_end_lasts_to_the_end_of_the_record() -> None:
@@ -99,7 +117,7 @@ def test_everything_that_was_asked_for_counts() -> None:
     rows = [
         {
             "cause": "",
-            "objects": [thing(1.0), thing(7.0, toppled=True, error_before_mm=6.0), thing(50.0, fallen_before=True)],
+            "objects": [thing(1.0), thing(7.0, toppled=True, error_before_mm=6.0, error_at_end_mm=4.0), thing(50.0, fallen_before=True)],
         },
         {"cause": "", "objects": [thing(2.0), thing(None, done=False, tried=False, cause="nudge: no_push")]},
         {"cause": "tool_pickup: no_probe", "objects": []},
@@ -113,6 +131,7 @@ def test_everything_that_was_asked_for_counts() -> None:
     assert summary["worlds_failed"] == {"tool_pickup: no_probe": 1}
     assert summary["position_error_mm"]["max"] == 7.0
     assert summary["off_before"] == 1
+    assert summary["within_at_end"]["rate"] == pytest.approx(1 / 3)
     assert space.summarise([])["within"]["n"] == 0
 
 
