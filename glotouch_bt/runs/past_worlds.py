@@ -13,8 +13,8 @@ from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, Chec
 from glotouch_bt.mission.read import conditions_of
 from glotouch_bt.robot import Backend, Robot, load_backend
 from glotouch_bt.runs.folder import require_run_folder
-from glotouch_bt.runs.resume_point import mission_of_run, stored_run
 from glotouch_bt.runs.result import truth
+from glotouch_bt.runs.resume_point import mission_of_run, stored_run
 from glotouch_bt.runs.robot_identity import require_same_robot
 
 

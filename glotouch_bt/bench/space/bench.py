@@ -43,8 +43,8 @@ WITHIN_MM = 5.0
 """Position error that an act may leave. Source: the goal of the project."""
 COLUMNS = (
     "act", "seed", "candidate", "object", "tried", "done", "cause", "position_error_mm", "error_before_mm",
-    "error_at_end_mm", "moved_mm", "tilt_deg", "toppled", "fallen_before", "peak_N", "duration_s", "exit_code", "status", "peak_force_N",
-    "sim_time_s", "wall_time_s", "folder",
+    "error_at_end_mm", "moved_mm", "tilt_deg", "toppled", "fallen_before", "peak_N", "duration_s", "exit_code",
+    "status", "peak_force_N", "sim_time_s", "wall_time_s", "folder",
 )  # fmt: skip
 
 

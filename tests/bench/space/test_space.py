@@ -117,7 +117,11 @@ def test_everything_that_was_asked_for_counts() -> None:
     rows = [
         {
             "cause": "",
-            "objects": [thing(1.0), thing(7.0, toppled=True, error_before_mm=6.0, error_at_end_mm=4.0), thing(50.0, fallen_before=True)],
+            "objects": [
+                thing(1.0),
+                thing(7.0, toppled=True, error_before_mm=6.0, error_at_end_mm=4.0),
+                thing(50.0, fallen_before=True),
+            ],
         },
         {"cause": "", "objects": [thing(2.0), thing(None, done=False, tried=False, cause="nudge: no_push")]},
         {"cause": "tool_pickup: no_probe", "objects": []},
