@@ -121,9 +121,29 @@ def test_however_it_goes_no_more_than_four_objects_are_taken(retrieve: Run) -> N
     assert ended(run)
 
 
+WRONG = {"object_check": [fails("wrong_object", fits=False), ok()], "put_back 3": fails("in_the_way")}
+
+
 @each_code("put_back")
-def test_a_wrong_object_that_cannot_be_put_back_ends_it(retrieve: Run, code: str) -> None:
-    run = retrieve({"object_check": fails("wrong_object", fits=False), "put_back 3": fails(code)})
+def test_a_wrong_object_that_cannot_be_put_back_is_set_down_elsewhere(retrieve: Run, code: str) -> None:
+    run = retrieve(WRONG | {"put_back 3": fails(code)})
+    assert run.succeeded
+    after = run.order[run.order.index("put_back 3") + 1 :]
+    assert after[:4] == ["find_place", "set_down", "reject", "match"]
+    assert run.calls_of("set_down")[0].inputs["places"] == run.calls_of("find_place")[0].outputs["places"]
+
+
+@each_code("find_place")
+def test_a_wrong_object_that_cannot_be_put_anywhere_ends_it(retrieve: Run, code: str) -> None:
+    run = retrieve(WRONG | {"find_place": fails(code)})
+    assert run.status == "failure"
+    assert ended(run)
+    assert run.never_ran("reject")
+
+
+@each_code("set_down")
+def test_a_wrong_object_that_cannot_be_set_down_either_ends_it(retrieve: Run, code: str) -> None:
+    run = retrieve(WRONG | {"set_down": fails(code)})
     assert run.status == "failure"
     assert ended(run)
     assert run.never_ran("reject")

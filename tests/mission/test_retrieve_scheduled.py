@@ -152,12 +152,12 @@ def test_if_no_space_can_be_made_the_first_reason_is_kept(retrieve: Run) -> None
 
 
 def test_an_object_that_can_be_set_down_nowhere_ends_the_mission_in_the_hand(retrieve: Run) -> None:
-    held = {"nudge": fails("no_push"), "set_down": fails("no_place"), "put_back 7": fails("in_the_way")}
+    held = {"nudge": fails("no_push"), "set_down 2": fails("no_place"), "put_back 7": fails("in_the_way")}
     held |= {"*/end safely/stow*": fails("object_held")}
     run = scheduled(retrieve, {"match*": REFUSED, "touch_next*": CRAMPED} | held)
     assert run.status == "failure"
-    assert (run.ran("nudge"), run.ran("set_down")) == (1, 1)
-    assert [c.skill for c in run.calls[run.order.index("set_down") + 1 :]] == ["put_back", "stow"]
+    assert (run.ran("nudge"), run.ran("set_down 2")) == (1, 1)
+    assert [c.skill for c in run.calls[run.order.index("set_down 2") + 1 :]] == ["put_back", "stow"]
 
 
 def test_where_the_hand_fits_at_no_grasp_space_is_made_and_the_target_is_recognised_again(retrieve: Run) -> None:

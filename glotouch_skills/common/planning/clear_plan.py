@@ -152,19 +152,35 @@ class ClearPlanner:
         yield None
         if grasp is None:
             return
+        for places in self.free_places(moving, grasp, leave):
+            if places:
+                yield Clearing(grasp, places)
+                return
+            yield None
+
+    def free_places(
+        self, moving: Candidate, grasp: GraspPlan, leave: bool = True
+    ) -> Iterator[tuple[FreePlace, ...]]:  # fmt: skip
+        """Yield nothing (an empty tuple) while it computes, then the places for a grasped object, nearest first.
+
+        Args:
+            moving: The object, where it was taken.
+            grasp: How it is held.
+            leave: It has to leave its place entirely.
+        """
+        others = [Neighbour.of(c) for c in self.candidates if c.index != moving.index]
         at = Stance(grasp.position_K_m[:2], grasp.yaw_rad, grasp.opening_m, grasp.aperture_m)
         for gap in GAPS_M:
             places: list[FreePlace] = []
             for found in self._places(moving, at, gap, others, leave):
                 if isinstance(found, FreePlace):
                     places.append(found)
-                yield None
+                yield ()
                 if len(places) == MAX_PLACES:
                     break
             if places:
-                yield Clearing(grasp, tuple(places))
+                yield tuple(places)
                 return
-        yield None
 
     def _space(self, target: Candidate, neighbours: Sequence[Neighbour], at: Array) -> float:
         return finger_space_m(target, [*neighbours, *self.obstacles], self.half_extent_m, self.gripper, at)
