@@ -22,6 +22,7 @@ from glotouch_bt.perception.search.bodies import (
     same_body,
 )
 from glotouch_bt.perception.search.map import SearchMap
+from glotouch_bt.perception.search.suspects import TWO_BODIES
 from glotouch_bt.perception.search.tracing import OutlineTrace
 from glotouch_bt.perception.touch import (
     Candidate,
@@ -43,10 +44,6 @@ MIN_CONTACTS = 3
 """Minimum number of contacts of a candidate's outline."""
 HALF_QUALITY_SD_M = 0.005
 """Standard deviation of the centre at quality 1/2."""
-TWO_BODIES = {"intercept": -3.9, "per_nat": 0.29}
-"""Log odds that a candidate is two bodies, before their number is considered, and what each nat gained by its best
-division adds. Source: the counts of `SEPARATE_NATS`, and 21 layouts in which objects were missed (planar, seeds
-61844-61892 of touching_five)."""
 OVERLAP_M = 0.008
 """Depth of the overlap of two outlines from which on their contacts are divided anew. Source: ours; outlines are
 known to a few millimetres."""

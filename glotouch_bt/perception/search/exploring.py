@@ -17,6 +17,7 @@ from glotouch_bt.perception.search.map import SearchMap
 from glotouch_bt.perception.search.moves import SearchPlan
 from glotouch_bt.perception.search.policies import SearchPolicy
 from glotouch_bt.perception.search.seeking import Sought, seek
+from glotouch_bt.perception.search.suspects import feel_suspect, next_suspect
 from glotouch_bt.perception.search.tracing import Elsewhere, OutlineTrace, TraceParams, trace, trace_more
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.robot import Array
@@ -35,7 +36,9 @@ def seek_next(
     lowered: bool,
     round_tip: bool = True,
 ) -> SearchPlan[tuple[Sought, tuple[Candidate, ...]]]:
-    """Search for the next object; where one of a known number is missing, decide whether a candidate is two bodies.
+    """Search for the next object; where one of a known number is missing, find out whether a candidate is two bodies.
+
+    The contact may be one with a candidate that is probably two bodies (`next_suspect`); its trace then goes on from there.
 
     Args:
         belief, known: Map and candidates.
@@ -44,6 +47,13 @@ def seek_next(
     """
     radius, enough = tip_radius_m if round_tip else 0.0, UNMET
     while True:
+        while (suspect := next_suspect(belief, known, radius)) is not None:
+            belief = belief.with_probed(suspect.index)
+            sought = yield from feel_suspect(belief, suspect, tip_K_m, lowered=lowered)
+            belief, tip_K_m, lowered = sought.belief, sought.tip_K_m, sought.lowered
+            if sought.contact is not None:
+                return sought, known
+        belief = belief.with_probed(None)
         sought = yield from seek(belief, policy, tip_K_m, lowered=lowered, enough=enough)
         belief, tip_K_m, lowered = sought.belief, sought.tip_K_m, sought.lowered
         if sought.contact is not None or belief.complete:

@@ -82,6 +82,8 @@ class SearchMap:
         left_below: With an unknown number, the chance that something is left below which the search is complete.
         interior_m: Length and width of the container's interior; None: its walls are unknown.
         doubt: Probability that there are fewer bodies than the known number, although as many objects are traced.
+        unprobed: Then the missing object may be a part of a candidate, and none has been probed for that since.
+        probed: Indices of candidates that were probed for that, each once.
     """
 
     half_extent_m: Array
@@ -93,6 +95,8 @@ class SearchMap:
     left_below: float = LEFT_BELOW
     interior_m: tuple[float, float] | None = None
     doubt: float = 0.0
+    unprobed: bool = False
+    probed: tuple[int, ...] = ()
 
     @classmethod
     def blank(
@@ -177,7 +181,11 @@ class SearchMap:
 
     def with_doubt(self, doubt: float) -> SearchMap:
         """Set the probability that there are fewer bodies than traced objects."""
-        return replace(self, doubt=doubt)
+        return replace(self, doubt=doubt, unprobed=doubt >= MISSED_BELOW)
+
+    def with_probed(self, index: int | None) -> SearchMap:
+        """Add a candidate that is probed because it may be two bodies; None: no further one needs that."""
+        return replace(self, unprobed=False) if index is None else replace(self, probed=(*self.probed, index))
 
     def with_hints(self, contacts: tuple[Contact, ...]) -> SearchMap:
         """Replace the hints."""
@@ -286,13 +294,14 @@ class SearchMap:
     def complete(self) -> bool:
         """True if all expected objects are traced; for an unknown number, if hardly anything can be left.
 
-        Of a doubtful number (`MISSED_BELOW`), a hint that is not followed yet may be the object that is missing.
+        Of a doubtful number (`MISSED_BELOW`), the object that is missing may be at a hint that is not followed yet, or a
+        part of a candidate that is probed first.
         """
         if self.expected is None:
             return not self.hints and self.chance_left < self.left_below
         if self.found < self.expected:
             return False
-        return self.doubt < MISSED_BELOW or (not self.hints and self.chance_missed < MISSED_BELOW)
+        return self.doubt < MISSED_BELOW or (not self.hints and not self.unprobed and self.chance_missed < MISSED_BELOW)
 
     @cached_property
     def _tree(self) -> scipy.spatial.cKDTree:
