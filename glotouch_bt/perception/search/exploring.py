@@ -38,7 +38,7 @@ def seek_next(
 ) -> SearchPlan[tuple[Sought, tuple[Candidate, ...]]]:
     """Search for the next object; where one of a known number is missing, find out whether a candidate is two bodies.
 
-    The contact may be one with a candidate that is probably two bodies (`next_suspect`); its trace then goes on from there.
+    The contact may be one with a candidate that is probably two bodies (`next_suspect`): its trace goes on from there.
 
     Args:
         belief, known: Map and candidates.

@@ -181,7 +181,7 @@ class SearchMap:
 
     def with_doubt(self, doubt: float) -> SearchMap:
         """Set the probability that there are fewer bodies than traced objects."""
-        return replace(self, doubt=doubt, unprobed=doubt >= MISSED_BELOW)
+        return replace(self, doubt=doubt, unprobed=doubt >= MISSED_BELOW and self.found == self.expected)
 
     def with_probed(self, index: int | None) -> SearchMap:
         """Add a candidate that is probed because it may be two bodies; None: no further one needs that."""
@@ -294,8 +294,8 @@ class SearchMap:
     def complete(self) -> bool:
         """True if all expected objects are traced; for an unknown number, if hardly anything can be left.
 
-        Of a doubtful number (`MISSED_BELOW`), the object that is missing may be at a hint that is not followed yet, or a
-        part of a candidate that is probed first.
+        Of a doubtful number (`MISSED_BELOW`), the object that is missing may be at a hint that is not followed yet, or
+        a part of a candidate that is probed first.
         """
         if self.expected is None:
             return not self.hints and self.chance_left < self.left_below

@@ -1,8 +1,8 @@
 """Candidates that may be two bodies although one outline explains their contacts, and a probe that tells.
 
-As many candidates are traced as objects are known, but two of them are probably one body. Then an object is missing. It
-may be hidden elsewhere, or it may be a part of a third candidate: contacts of two bodies that touch can fit one outline.
-Where their borders would meet, the ball gets deeper than that outline allows.
+As many candidates are traced as objects are known, but two of them are probably one body. Then an object is missing.
+It may be hidden elsewhere, or it may be a part of a third candidate: contacts of two bodies that touch can fit one
+outline. Where their borders would meet, the ball gets deeper than that outline allows.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def next_suspect(belief: SearchMap, candidates: tuple[Candidate, ...], radius_m:
         candidates: All candidates.
         radius_m: Radius of the ball; 0 for another section, whose contacts do not tell bodies apart.
     """
-    if radius_m == 0.0 or not belief.unprobed or belief.found != belief.expected:
+    if radius_m == 0.0 or not belief.unprobed:
         return None
     found = doubts(candidates, radius_m, belief.path_K_m)
     best, likeliest = None, WORTH_LOG_ODDS

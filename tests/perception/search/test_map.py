@@ -148,6 +148,8 @@ def test_a_doubtful_object_counts_once_hardly_anything_can_have_been_missed():
     rows = np.arange(-0.138, 0.139, 0.012)
     x = np.tile([-0.188, 0.188, 0.188, -0.188], len(rows))[: 2 * len(rows)]
     swept = doubtful.with_path(np.column_stack([x, np.repeat(rows, 2)]))
+    assert not swept.complete, "the object may be a part of a candidate"
+    swept = swept.with_probed(None)
     assert swept.complete
     hint = Contact(0.0, np.zeros(3), np.array([1.0, 0, 0]), np.array([-1.0, 0, 0]), np.array([0.1, 0.0]), 1.0)
     assert not swept.with_hints((hint,)).complete, "what was met may be the one that is missing"

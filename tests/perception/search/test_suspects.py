@@ -67,7 +67,8 @@ def test_a_probe_goes_between_the_two_parts_from_outside(doubtful) -> None:
 def test_nothing_is_suspected_without_a_doubt_or_after_its_probe(doubtful) -> None:
     belief, known = doubtful
     assert next_suspect(belief.with_doubt(0.0), known, R) is None
-    assert next_suspect(replace(belief, expected=None), known, R) is None
+    assert next_suspect(replace(belief, expected=4).with_doubt(0.8), known, R) is None, "one is missing anyway"
+    assert next_suspect(replace(belief, expected=None).with_doubt(0.8), known, R) is None
     assert next_suspect(belief, known, 0.0) is None, "contacts of another section do not tell bodies apart"
     assert next_suspect(belief.with_probed(2), known, R) is None
 
