@@ -42,10 +42,14 @@ class PastWorlds:
         self.robot.restore(world)
 
     def objects(self, row: CheckpointRow) -> list[Any]:
-        """Put the world back and return its objects as in truth.json; empty if the backend tells no truth."""
+        """Put the world back and return its objects as in truth.json; empty if the backend tells no truth.
+
+        They lack `in_gripper`: a checkpoint has no contacts.
+        """
         self.restore(row)
         referee = self.backend.referee(self.robot)
-        return [] if referee is None else truth(referee.objects())
+        found = [] if referee is None else truth(referee.objects())
+        return [{key: value for key, value in one.items() if key != "in_gripper"} for one in found]
 
 
 @contextmanager

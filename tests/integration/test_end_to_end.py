@@ -14,6 +14,7 @@ import pytest
 
 from glotouch_bt.report import read_run
 from glotouch_bt.robot import Limits
+from glotouch_bt.runs import past_worlds
 from glotouch_bt.runs.launch import RunRequest, RunResult, launch
 
 SCHEMA = {
@@ -78,6 +79,12 @@ def test_an_apple_is_retrieved(tmp_path: Path) -> None:
     assert (result["target"], result["retrieved"], result["correct"]) == ("apple", "apple", True)
     assert 0.0 < result["peak_force_N"] < Limits().hard_force_N
     assert result["conditions"] == "nominal"
+    with past_worlds(done.folder) as worlds:  # before the first tick, and after the last skill
+        first, last = (worlds.objects(row) for row in (worlds.rows[0], worlds.rows[-1]))
+    truth = json.loads((done.folder / "truth.json").read_text())
+    assert [o["pose_B_O"] for o in first] == [o["pose_B_O"] for o in truth["start"]]
+    for there, end in zip(last, truth["end"], strict=True):
+        assert math.dist(there["pose_B_O"]["position_m"], end["pose_B_O"]["position_m"]) < 0.002
     assert len(result["candidates"]) == 5
     assert result["contacts"] > 20
     assert result["ranking"]
