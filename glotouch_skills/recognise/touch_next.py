@@ -101,13 +101,14 @@ class TouchNext(Skill):
     refused = Out(tuple, "closures that could not be made: candidate, yaw in degrees, height and place in mm")
     doubtful = Out(
         tuple,
-        "indices of candidates that may be elsewhere: a closure met something, or all met nothing, and none felt them",
+        "indices of candidates that may be elsewhere or have another outline: a closure met something, all met "
+        "nothing, or the jaws do not span the outline, and none felt them",
         element=int,
     )
     cramped = Out(
         tuple, "indices of candidates on which closures lack only space, most probable first", element=int, always=True
     )
-    lacks_space = Out(bool, "`decided`, but closures on `cramped` would tell more if they had space", always=True)
+    lacks_space = Out(bool, "closures on `cramped` would tell more if they had space", always=True)
     decided = Out(bool, "no further closure is needed")
 
     def __init__(self, name: str, params: SkillParams, context: Context) -> None:
@@ -160,9 +161,13 @@ class TouchNext(Skill):
         why = recognition.enough(belief, self.params.confidence, self._hopeless)
         chosen = None if why else self._choose(belief, down)
         self._tell_unfit()
-        if chosen is None and not why:
-            self.cramped = self._lacking_space(belief)
+        if not why and (chosen is None or self.refused):
+            found = self._options(belief, None)
+            self.cramped = self._lacking_space(belief, found)
             self.lacks_space = bool(self.cramped)
+            if chosen is None:  # the target fits between the jaws; an outline that does not is wrong
+                too_wide = recognition.hardly_felt(belief) - {o.closure.candidate for o in found}
+                self.doubtful = tuple(sorted({*self.doubtful, *too_wide}))
         if chosen is not None and chosen.closure.candidate in self._unmeasured(belief):
             why = f"candidate {chosen.closure.candidate} would tell most, once the probe has measured it"
         if why or chosen is None:
@@ -205,13 +210,9 @@ class TouchNext(Skill):
 
         It may be on a candidate that the probe must measure first; the time of that counts.
         """
-        p, arm = self.params, self.context.arm
-        pose_K_P = self.context.world.container.pose_B_K.inverse() @ arm.pose_B_P
-        standing = None
-        if down is not None:
-            standing = Standing(down.candidate.index, down.at, float(pose_K_P.position_m[2]))
-        found = options(belief.touchsets, standing, pose_K_P.position_m, arm.felt, arm.description.gripper, p)
-        found = [o for o in found if _key(o) not in self.refused and o.closure.candidate not in self._hopeless]
+        p = self.params
+        found = [o for o in self._options(belief, down) if _key(o) not in self.refused]
+        found = [o for o in found if o.closure.candidate not in self._hopeless]
         later = self._unmeasured(belief)
         found = [replace(o, seconds=o.seconds + MEASURE_S) if o.closure.candidate in later else o for o in found]
         if not found:
@@ -232,6 +233,13 @@ class TouchNext(Skill):
             if option is not None:
                 return option
         return None
+
+    def _options(self, belief: Belief, down: Squeezing | None) -> list[Option]:
+        """Return all closures that were not made yet, also those that were refused."""
+        arm = self.context.arm
+        hand_K_m = (self.context.world.container.pose_B_K.inverse() @ arm.pose_B_P).position_m
+        standing = None if down is None else Standing(down.candidate.index, down.at, float(hand_K_m[2]))
+        return options(belief.touchsets, standing, hand_K_m, arm.felt, arm.description.gripper, self.params)
 
     def _unmeasured(self, belief: Belief) -> frozenset[int]:
         """Return the candidates whose outline or top the probe did not measure, unless the jaws may close on them."""
@@ -263,12 +271,9 @@ class TouchNext(Skill):
             return replace(option, at=at, instead_of=option.at, closure=replace(made, gain_nats=float(gains[i][0])))
         return None
 
-    def _lacking_space(self, belief: Belief) -> tuple[int, ...]:
-        """Return the candidates for whose closures space should be made, most probable first."""
-        p, arm = self.params, self.context.arm
-        hand_K_m = (self.context.world.container.pose_B_K.inverse() @ arm.pose_B_P).position_m
-        found = options(belief.touchsets, None, hand_K_m, arm.felt, arm.description.gripper, p)
-        later = self._unmeasured(belief)
+    def _lacking_space(self, belief: Belief, found: list[Option]) -> tuple[int, ...]:
+        """Return the candidates for whose closures, of those found, space should be made, most probable first."""
+        p, later = self.params, self._unmeasured(belief)
         refused = [o for o in found if _key(o) in self.refused and o.closure.candidate not in later]
         wanted = recognition.wanted(belief, p.confidence, self._hopeless) | recognition.hardly_felt(belief)
         return lacking_space(self.context, belief, refused, p, p.min_gain_nats, wanted)

@@ -253,6 +253,28 @@ def test_it_says_which_candidate_lacks_space(make, monkeypatch, refusal: type[Mo
     assert content.cramped == (), "closures that tell too little need no space"
 
 
+def test_what_lacks_space_is_known_while_others_are_touched(make, monkeypatch) -> None:
+    """A mission that ends the closures by their number can still make space."""
+
+    def require_clear(arm, pose, opening_m, margin_m=0.0) -> None:
+        if pose.position_m[1] > 0.0:
+            raise NoSpace("pose", "a neighbour is near")
+
+    monkeypatch.setattr(closure_space, "require_clear", require_clear)
+    b, skill = make(Oracle(right=1, enough=3))
+    b.run(skill)
+    assert not skill.decided
+    assert (skill.cramped, skill.lacks_space) == ((1,), True)
+
+
+def test_a_likely_candidate_that_the_jaws_do_not_span_is_doubted(make, found) -> None:
+    """The target fits between the jaws, so this outline holds contacts of other objects."""
+    wide = found.box((0.0, 0.08), (0.12, 0.10), index=1)
+    b, skill = make(Oracle(right=1, enough=0), things=(found.round((0.0, -0.08), 0.025), wide))
+    repeat(b, skill)
+    assert skill.doubtful == (1,)
+
+
 def test_nothing_lacks_space_when_it_is_known(make) -> None:
     b, skill = make(Oracle(right=1, enough=3))
     repeat(b, skill)
