@@ -133,17 +133,9 @@ def test_a_wrong_object_that_cannot_be_put_back_is_set_down_elsewhere(retrieve: 
     assert run.calls_of("set_down")[0].inputs["places"] == run.calls_of("find_place")[0].outputs["places"]
 
 
-@each_code("find_place")
-def test_a_wrong_object_that_cannot_be_put_anywhere_ends_it(retrieve: Run, code: str) -> None:
-    run = retrieve(WRONG | {"find_place": fails(code)})
-    assert run.status == "failure"
-    assert ended(run)
-    assert run.never_ran("reject")
-
-
-@each_code("set_down")
-def test_a_wrong_object_that_cannot_be_set_down_either_ends_it(retrieve: Run, code: str) -> None:
-    run = retrieve(WRONG | {"set_down": fails(code)})
+@pytest.mark.parametrize(("node", "code"), [(s, c) for s in ("find_place", "set_down") for c in SHELF[s].failures()])
+def test_a_wrong_object_that_cannot_be_put_anywhere_ends_it(retrieve: Run, node: str, code: str) -> None:
+    run = retrieve(WRONG | {node: fails(code)})
     assert run.status == "failure"
     assert ended(run)
     assert run.never_ran("reject")

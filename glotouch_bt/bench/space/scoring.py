@@ -56,6 +56,8 @@ def score(
 ) -> list[dict[str, Any]]:
     """Return one row for each act of a run.
 
+    Tilts compare the world before the first act with the end of the run: what a later act topples counts, too.
+
     Args:
         record: The run, with its truth.
         sections: Probe sections of the objects by name.

@@ -82,8 +82,9 @@ class SearchMap:
         left_below: With an unknown number, the chance that something is left below which the search is complete.
         interior_m: Length and width of the container's interior; None: its walls are unknown.
         doubt: Probability that there are fewer bodies than the known number, although as many objects are traced.
-        unprobed: Then the missing object may be a part of a candidate, and none has been probed for that since.
-        probed: Indices of candidates that were probed for that, each once.
+        unprobed: As many objects are traced as are known, but in doubt, and candidates that may be two bodies are still
+            to be probed.
+        probed: Indices of the candidates that were probed for that; each is probed once.
     """
 
     half_extent_m: Array
@@ -184,7 +185,7 @@ class SearchMap:
         return replace(self, doubt=doubt, unprobed=doubt >= MISSED_BELOW and self.found == self.expected)
 
     def with_probed(self, index: int | None) -> SearchMap:
-        """Add a candidate that is probed because it may be two bodies; None: no further one needs that."""
+        """Add a candidate that is probed because it may be two bodies; None: no further one is worth a probe."""
         return replace(self, unprobed=False) if index is None else replace(self, probed=(*self.probed, index))
 
     def with_hints(self, contacts: tuple[Contact, ...]) -> SearchMap:

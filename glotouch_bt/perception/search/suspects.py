@@ -23,16 +23,16 @@ TWO_BODIES = {"intercept": -3.9, "per_nat": 0.29}
 """Log odds that a candidate is two bodies, before their number is considered, and what each nat gained by its best
 division adds. Source: the counts of `SEPARATE_NATS`, and 21 layouts in which objects were missed (planar, seeds
 61844-61892 of touching_five)."""
-WORTH_LOG_ODDS = -2.0
-"""Log odds that a candidate is two bodies above which it is probed. A lower limit probes more single objects, whose
-outlines change then, and takes travel. Source: of 29 searches of touching_five that had ended (planar, seeds
-55400-55425, 55427, 55435 and 55438), 4 had such a candidate, and all 4 lacked an object."""
+MIN_LOG_ODDS = -2.0
+"""Minimum log odds that a candidate is two bodies for it to be probed. With a lower limit more single objects are
+probed, which takes travel and changes outlines that were right. Source: of 29 searches of touching_five that had ended
+(planar, seeds 55400-55425, 55427, 55435 and 55438), 4 had such a candidate, and all 4 lacked an object."""
 CLEAR_M = 0.008
-"""Distance of the ball from the outline where a probe starts."""
+"""Distance of the ball from the outline where a probe starts. Source: ours."""
 FARTHEST_M = 0.15
-"""Largest distance of such a start from the outline's centre. Source: larger than any object."""
+"""Maximum distance of such a start from the outline's centre. Source: ours; larger than any object."""
 SHORT_OF_M = 0.004
-"""Distance before the outline's centre at which a probe ends."""
+"""Distance before the outline's centre at which a probe ends. Source: ours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ def next_suspect(belief: SearchMap, candidates: tuple[Candidate, ...], radius_m:
     if radius_m == 0.0 or not belief.unprobed:
         return None
     found = doubts(candidates, radius_m, belief.path_K_m)
-    best, likeliest = None, WORTH_LOG_ODDS
+    best, likeliest = None, MIN_LOG_ODDS
     for candidate in candidates:
         pair = max((d.chance for d in found if all(candidate is not c for c in d.pair)), default=0.0)
         if pair < MISSED_BELOW or candidate.index in belief.probed:

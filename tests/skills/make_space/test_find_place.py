@@ -10,8 +10,8 @@ from glotouch_bt.perception.touch import signed_distance
 from glotouch_skills.common.planning.grasp_plan import GraspPlan
 from glotouch_skills.make_space.find_place import FindPlace
 
-LEAST_GAP_M = 0.012
-"""Least gap that a place keeps, as the places of `clear_plan`."""
+MIN_GAP_M = 0.012
+"""Minimum gap that a place keeps: the smallest of `GAPS_M` of the planner."""
 RADIUS_M = 0.025
 
 
@@ -34,9 +34,9 @@ def test_places_keep_their_distance_from_objects_walls_and_the_old_place(bench, 
     ways = []
     for place in skill.places:
         centre = place.moved(held.contour.centre_K_m)
-        assert np.abs(centre + rim).max(axis=0)[0] <= half[0] - LEAST_GAP_M + 1e-4
-        assert np.abs(centre + rim).max(axis=0)[1] <= half[1] - LEAST_GAP_M + 1e-4
-        assert signed_distance(other.contour, centre + rim).min() >= LEAST_GAP_M - 1e-4
+        assert np.abs(centre + rim).max(axis=0)[0] <= half[0] - MIN_GAP_M + 1e-4
+        assert np.abs(centre + rim).max(axis=0)[1] <= half[1] - MIN_GAP_M + 1e-4
+        assert signed_distance(other.contour, centre + rim).min() >= MIN_GAP_M - 1e-4
         ways.append(np.linalg.norm(centre - held.contour.centre_K_m))
         assert ways[-1] >= 2 * RADIUS_M - 1e-4
     assert ways == sorted(ways)
