@@ -18,7 +18,14 @@ import scipy
 from glotouch_bt.perception.search.map import Mask
 from glotouch_bt.perception.search.tracing import TraceParams
 from glotouch_bt.perception.touch import Candidate, Contact, signed_distance
-from glotouch_bt.perception.touch.outline import OutlineBelief, convex_hull, envelope, infer_outline, polygon_distance
+from glotouch_bt.perception.touch.outline import (
+    OutlineBelief,
+    convex_hull,
+    envelope,
+    infer_outline,
+    nearest_distance,
+    polygon_distance,
+)
 from glotouch_bt.robot import Array, ParamError
 
 SEPARATE_NATS = 12.0
@@ -74,7 +81,7 @@ def outline_of(contacts: tuple[Contact, ...], radius_m: float, free_K_m: Array |
     """
     places = np.array([c.tip_K_m[:2] if radius_m > 0 else c.point_K_m for c in contacts])
     if free_K_m is not None and len(free_K_m):
-        free_K_m = free_K_m[_distance(free_K_m, places) > MOVED_M]
+        free_K_m = free_K_m[nearest_distance(free_K_m, places) > MOVED_M]
     return infer_outline(
         places,
         radius_m,
@@ -235,7 +242,7 @@ def gain_of_two(a: Candidate, b: Candidate, radius_m: float, path_K_m: Array) ->
 def _near(path_K_m: Array, contacts: tuple[Contact, ...]) -> Array:
     """Return the path positions (n, 2) that may be evidence about the body of these contacts."""
     points = np.array([c.point_K_m for c in contacts])
-    return path_K_m[_distance(path_K_m, points) < NEAR_M] if len(path_K_m) else path_K_m
+    return path_K_m[nearest_distance(path_K_m, points) < NEAR_M] if len(path_K_m) else path_K_m
 
 
 def _divided(contacts: tuple[Contact, ...], radius_m: float, free: Array, gain: float) -> list[tuple[Contact, ...]]:
@@ -282,8 +289,3 @@ def _partitions(points: Array) -> list[Mask]:
             part ^= not part[0]
             found.setdefault(part.tobytes(), part)
     return list(found.values())
-
-
-def _distance(points: Array, others: Array) -> Array:
-    """Return the distances (n,) of points (n, 2) from the nearest of others (m, 2)."""
-    return np.asarray(np.linalg.norm(points[:, None] - others[None], axis=2).min(axis=1))

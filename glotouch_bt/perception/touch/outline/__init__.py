@@ -9,6 +9,7 @@ from glotouch_bt.perception.touch.outline.polygons import (
     area_and_centroid,
     convex_hull,
     minimum_rectangle,
+    nearest_distance,
     polygon_distance,
 )
 from glotouch_bt.perception.touch.outline.primitives import wrapped

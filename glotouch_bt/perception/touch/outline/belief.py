@@ -10,9 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from glotouch_bt.perception.touch.outline.deviation import Hypothesis, infer_posteriors
+from glotouch_bt.compiled import compiled
+from glotouch_bt.perception.touch.outline.deviation import Hypothesis
 from glotouch_bt.perception.touch.outline.fitting import fit_both
 from glotouch_bt.perception.touch.outline.mixture import TEMPER, OutlineBelief
+from glotouch_bt.perception.touch.outline.polygons import nearest_distance
+from glotouch_bt.perception.touch.outline.posteriors import infer_posteriors
 from glotouch_bt.perception.touch.outline.primitives import (
     APPROACH_SD_RAD,
     CONTACT_SD_M,
@@ -118,7 +121,7 @@ def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:
     plain, more = np.array(distinct[:1] * len(scales) + distinct[1:]), len(distinct) - 1
     found += infer_posteriors(rounded, plain, [0.0] * len(plain), touches, scales + scales[:1] * more)
     found += infer_posteriors(rounded, np.array(distinct[:1] * 2), AMPLITUDES[:2], touches)
-    found = [h if h.shape is circle else _open_sided(h, touches.current) for h in found]
+    found = _open_sided(found, touches.current)
     prior = [*loose_priors, *[DEVIATION_PRIOR] * len(AMPLITUDES), *loose_priors, *loose_priors[:1] * more]
     prior += [DEVIATION_PRIOR] * 2
     score = TEMPER * np.array([h.log_evidence for h in found]) + np.log(prior)
@@ -129,30 +132,47 @@ def _hypotheses(touches: Touches) -> tuple[tuple[Hypothesis, ...], Array]:
     return tuple(found[i] for i in order), kept / kept.sum()
 
 
-def _open_sided(h: Hypothesis, touches: Touches) -> Hypothesis:
-    """Return a rectangle with larger variance on its untouched sides.
+def _open_sided(found: list[Hypothesis], touches: Touches) -> list[Hypothesis]:
+    """Return the hypotheses, rectangles with larger variance on their untouched sides.
 
     Contacts bound such a side from inside only, so the Gaussian at the optimum is too narrow. The nearest free position
     beyond the side bounds it from outside.
     """
-    x, y, yaw, *half = h.corrected[:5]
-    covariance = h.covariance.copy()
     known = np.isfinite(touches.normal_sd_rad)
     outward = np.column_stack([np.cos(touches.normal_rad[known]), np.sin(touches.normal_rad[known])])
+    opened = []
+    for h in found:
+        if h.shape is not circle:
+            covariance = h.covariance.copy()
+            _open_sides(h.corrected, outward, touches.free_m, touches.radius_m, covariance)
+            h = replace(h, covariance=covariance)
+        opened.append(h)
+    return opened
+
+
+@compiled("f8[:]", "f8[:, ::1]", "f8[:, :]", "f8", "f8[:, ::1]")
+def _open_sides(box: Array, outward: Array, free: Array, radius: float, covariance: Array) -> None:
+    """Add the variance of the untouched sides of a rectangle (6,) to its covariance; `outward` are normals (k, 2)."""
+    step = np.zeros(5)
     for side in range(4):
-        angle = yaw + 0.5 * math.pi * side
-        normal, along = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
-        if np.any(outward @ normal > SIDE_COSINE):
+        angle = box[2] + 0.5 * math.pi * side
+        c, s = math.cos(angle), math.sin(angle)
+        touched = False
+        for j in range(len(outward)):
+            touched |= outward[j, 0] * c + outward[j, 1] * s > SIDE_COSINE
+        if touched:
             continue
-        reach = half[side % 2]
-        off = touches.free_m - (x, y)
-        beside = np.abs(off @ along) < half[1 - side % 2] + touches.radius_m
-        beyond = off[beside] @ normal - reach - touches.radius_m
-        gap = float(np.min(beyond[beyond > 0.0], initial=MAX_OPEN_SIDE_M))
-        step = np.zeros(len(covariance))
-        step[:2], step[3 + side % 2] = 0.5 * normal, 0.5
-        covariance += (0.5 * gap) ** 2 * np.outer(step, step)
-    return replace(h, covariance=covariance)
+        gap = MAX_OPEN_SIDE_M
+        for j in range(len(free)):
+            x, y = free[j, 0] - box[0], free[j, 1] - box[1]
+            beyond = x * c + y * s - box[3 + side % 2] - radius
+            if abs(y * c - x * s) < box[4 - side % 2] + radius and beyond > 0.0:
+                gap = min(gap, beyond)
+        step[:] = 0.0
+        step[0], step[1], step[3 + side % 2] = 0.5 * c, 0.5 * s, 0.5
+        for a in range(5):
+            for b in range(5):
+                covariance[a, b] += (0.5 * gap) ** 2 * step[a] * step[b]
 
 
 def _distinct(boxes: Array) -> list[Array]:
@@ -175,8 +195,7 @@ def _nearest_free(free: Array, touches: Touches) -> Array:
     middle = touches.prior_centre_m
     if len(touches.tips_m) > 2:
         middle = 0.5 * (touches.tips_m.min(axis=0) + touches.tips_m.max(axis=0))
-    gap = np.min(np.linalg.norm(free[:, None] - touches.tips_m, axis=2), axis=1)
-    off = free[gap > 0.5 * touches.radius_m] - middle
+    off = free[nearest_distance(free, touches.tips_m) > 0.5 * touches.radius_m] - middle
     distance = np.linalg.norm(off, axis=1)
     off, distance = off[distance < MAX_FREE_DISTANCE_M], distance[distance < MAX_FREE_DISTANCE_M]
     sector = np.floor((np.arctan2(off[:, 1], off[:, 0]) / (2 * math.pi) + 0.5) * FREE_SECTORS).astype(int)

@@ -18,6 +18,8 @@ from glotouch_bt.compiled import compiled
 from glotouch_bt.perception.touch.outline.primitives import (
     CORNER_M,
     FREE_SD_M,
+    INWARD_COSINE,
+    INWARD_LOSS,
     MAX_SIZE_M,
     MIN_SIZE_M,
     TYPICAL_M,
@@ -40,10 +42,6 @@ LONGEST_M = 0.02
 """Maximum displacement of a centre in one step of the descent, per axis. Source: ours."""
 LONGEST_RAD = 0.3
 """Maximum turn in one step of the descent. Source: ours."""
-INWARD_COSINE = 0.3
-"""Cosine between approach and outward normal above which a contact would have come from inside. Source: ours."""
-INWARD_LOSS = 10.0
-"""Loss of such a contact, nats. Source: ours."""
 STEPS = 14
 """Maximum number of steps of the descent. Source: ours."""
 GAIN = 1e-2
@@ -274,17 +272,19 @@ def _round_starts(touches: Touches) -> Array:
 def _rectangle_starts(touches: Touches) -> Array:
     """Return start boxes (s, 6): around the contacts at twelve yaws, and typical ones behind them."""
     tips, r = touches.tips_m, touches.radius_m
-    starts = []
-    for yaw in np.arange(12) * (np.pi / 24) if len(tips) > 2 else ():
-        c, s = np.cos(yaw), np.sin(yaw)
-        rotation = np.array([[c, s], [-s, c]])
-        local = tips @ rotation.T
-        low, high = local.min(axis=0), local.max(axis=0)
-        starts.append([*(0.5 * (low + high) @ rotation), yaw, *(0.5 * (high - low) - r), CORNER_M])
+    starts: list[list[float]] = []
+    if len(tips) > 2:
+        yaw = np.arange(12) * (np.pi / 24)
+        c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+        x, y = c * tips[:, 0] + s * tips[:, 1], c * tips[:, 1] - s * tips[:, 0]
+        low, high = np.array([x.min(axis=1), y.min(axis=1)]), np.array([x.max(axis=1), y.max(axis=1)])
+        (mx, my), half = 0.5 * (low + high), 0.5 * (high - low) - r
+        middles = (c[:, 0] * mx - s[:, 0] * my, s[:, 0] * mx + c[:, 0] * my)
+        starts = np.column_stack([*middles, yaw, *half, np.full(len(yaw), CORNER_M)]).tolist()
     for middle in _middles(touches):
         push = middle - tips.mean(axis=0)
-        yaw = float(np.arctan2(push[1], push[0]))
-        starts += [[*middle, yaw + t, 0.5 * TYPICAL_M, 0.5 * TYPICAL_M, CORNER_M] for t in (-0.5, 0.0, 0.5, np.pi / 4)]
+        back = float(np.arctan2(push[1], push[0]))
+        starts += [[*middle, back + t, 0.5 * TYPICAL_M, 0.5 * TYPICAL_M, CORNER_M] for t in (-0.5, 0.0, 0.5, np.pi / 4)]
     return np.array(starts)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import Array, ParamError
 
 Indices = npt.NDArray[np.int64]
@@ -116,3 +117,21 @@ def polygon_distance(polygon_m: Array, points_m: Array) -> Array:
     rise = np.where(edge[:, 1] == 0.0, 1.0, edge[:, 1])
     crossed = spans & (x < a[:, 0] + (y - a[:, 1]) / rise * edge[:, 0])
     return np.asarray(np.where(np.sum(crossed, axis=1) % 2 == 1, -distance, distance))
+
+
+def nearest_distance(points_m: Array, others_m: Array) -> Array:
+    """Return the distances (n,) of points (n, 2) from the nearest of others (m, 2), m > 0."""
+    found = np.zeros(len(points_m))
+    _nearest_distance(points_m, others_m, found)
+    return found
+
+
+@compiled("given f8[:, :]", "given f8[:, :]", "f8[::1]")
+def _nearest_distance(points: Array, others: Array, found: Array) -> None:
+    """See `nearest_distance`; `found` is filled."""
+    for i in range(len(points)):
+        least = np.inf
+        for j in range(len(others)):
+            x, y = points[i, 0] - others[j, 0], points[i, 1] - others[j, 1]
+            least = min(least, x * x + y * y)
+        found[i] = np.sqrt(least)

@@ -32,6 +32,10 @@ APPROACH_SD_RAD = 0.60
 """Standard deviation of the outward normal about the reversed approach, where the reaction is unknown."""
 FREE_SD_M = 0.001
 """Standard deviation of the penalty on an outline that covers a free position."""
+INWARD_COSINE = 0.3
+"""Cosine between approach and outward normal above which a contact would have come from inside. Source: ours."""
+INWARD_LOSS = 10.0
+"""Loss of such a contact, nats. Source: ours."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +86,12 @@ class Touches:
 
 @dataclass(frozen=True)
 class Geometry:
-    """Signed distances (s, k) of points from shapes, bearings (s, k) of the nearest outward normals, and the
-    derivatives (s, k, p) of both by the parameters. The first two of `by_params` are the negated normal."""
+    """Signed distances (s, k) of points from shapes, their derivatives (s, k, p) by the parameters, of which the first
+    two are the negated normal, and bearings (s, k) of the nearest outward normals."""
 
     distance_m: Array
     by_params: Array
     normal_rad: Array
-    normal_by_params: Array
 
 
 Shape = Callable[[Array, Array], Geometry]
@@ -99,17 +102,14 @@ def circle(params: Array, points_m: Array) -> Geometry:
     """Return the geometry of circles (s, 3) = x, y, radius."""
     dx, dy = points_m[..., 0] - params[:, :1], points_m[..., 1] - params[:, 1:2]
     norm = np.maximum(np.sqrt(dx * dx + dy * dy), 1e-9)
-    by, turn = np.zeros((2, *norm.shape, 3))
-    ux, uy = dx / norm, dy / norm
-    by[..., 0], by[..., 1], by[..., 2] = -ux, -uy, -1.0
-    turn[..., 0], turn[..., 1] = uy / norm, -ux / norm
-    return Geometry(norm - params[:, 2:3], by, np.arctan2(dy, dx), turn)
+    by = np.stack([-dx / norm, -dy / norm, -np.ones_like(norm)], axis=-1)
+    return Geometry(norm - params[:, 2:3], by, np.arctan2(dy, dx))
 
 
 def rectangle(params: Array, points_m: Array) -> Geometry:
     """Return the geometry of rectangles (s, 5) = x, y, yaw, half sides along and across the yaw."""
     g = rounded(np.concatenate([params, np.zeros((len(params), 1))], axis=1), points_m)
-    return Geometry(g.distance_m, g.by_params[..., :5], g.normal_rad, g.normal_by_params[..., :5])
+    return Geometry(g.distance_m, g.by_params[..., :5], g.normal_rad)
 
 
 def rounded(params: Array, points_m: Array) -> Geometry:
@@ -130,17 +130,11 @@ def rounded(params: Array, points_m: Array) -> Geometry:
     grad_x = np.where(outside, out_x / size, nearer_x)
     grad_y = np.where(outside, out_y / size, ~nearer_x)
     gx, gy = np.copysign(grad_x, x), np.copysign(grad_y, y)
-    by, turn = np.zeros((2, *norm.shape, 6))
+    by = np.zeros((*norm.shape, 6))
     by[..., 0], by[..., 1], by[..., 2] = s * gy - c * gx, -(s * gx + c * gy), gx * y - gy * x
     by[..., 3], by[..., 4], by[..., 5] = -grad_x, -grad_y, grad_x + grad_y - 1.0
-    # The normal depends on the yaw; at a corner also on the position: d(atan2(v_y, v_x)) of v from the corner.
-    beside = ((out_x > 0) & (out_y > 0)) / size
-    tx, ty = -gy * beside, gx * beside
-    turn_x, turn_y = -np.copysign(1.0, x) * tx, -np.copysign(1.0, y) * ty
-    turn[..., 0], turn[..., 1], turn[..., 2] = s * ty - c * tx, -(s * tx + c * ty), 1.0 + tx * y - ty * x
-    turn[..., 3], turn[..., 4], turn[..., 5] = turn_x, turn_y, -turn_x - turn_y
     distance = np.where(outside, norm, np.maximum(over_x, over_y)) - params[:, 5:]
-    return Geometry(distance, by, params[:, 2:3] + np.arctan2(gy, gx), turn)
+    return Geometry(distance, by, params[:, 2:3] + np.arctan2(gy, gx))
 
 
 def ray_m(params: Array, grown_m: float, origin_m: Array, unit: Array) -> Array:

@@ -6,8 +6,7 @@ from scipy.spatial import ConvexHull
 
 from glotouch_bt.perception import touch
 from glotouch_bt.perception.touch import current_tips, infer_outline, signed_distance
-from glotouch_bt.perception.touch.outline.deviation import infer_posteriors
-from glotouch_bt.perception.touch.outline.primitives import Touches, circle, rounded, wrapped
+from glotouch_bt.perception.touch.outline.primitives import rounded, wrapped
 from glotouch_bt.robot import ParamError
 from tests.perception.touch.outline.conftest import rectangle, turned
 
@@ -147,23 +146,6 @@ def test_outline_is_equivariant_to_rigid_motions(bench):
     np.testing.assert_allclose(there.centre_K_m, here.centre_K_m @ turn + [0.2, -0.1], atol=2e-4)
     np.testing.assert_allclose(there.contour.size_m, here.contour.size_m, atol=4e-4)
     assert abs(np.sin(there.contour.yaw_rad - here.contour.yaw_rad - 0.8)) < 0.02
-
-
-def test_evidence_of_a_linear_problem_is_the_gaussian_density():
-    """A circle seen nearly linearly: against the density of the contacts under the marginal normal distribution."""
-    rng = np.random.default_rng(0)
-    a = np.linspace(0, 6, 7)
-    tips = 0.036 * np.c_[np.cos(a), np.sin(a)] + rng.normal(0, 3e-4, (7, 2))
-    nothing = np.zeros((7, 2))
-    touches = Touches(tips, np.zeros(7), np.full(7, np.inf), nothing, nothing[:0], R)
-    p = np.array([0.0, 0.0, 0.030])
-    h = infer_posteriors(circle, p[None], [0.0], touches)[0]
-    jacobian = circle(p[None], tips).by_params[0]
-    sd = np.array([0.025, 0.025, 0.014])
-    mean = circle(p[None], tips).distance_m[0] - R + jacobian @ (np.array([*tips.mean(0), 0.030]) - p)
-    covariance = jacobian @ np.diag(sd**2) @ jacobian.T + touches.contact_sd_m**2 * np.eye(7)
-    want = -0.5 * mean @ np.linalg.solve(covariance, mean) - 0.5 * np.linalg.slogdet(covariance)[1]
-    assert h.log_evidence == pytest.approx(want, rel=1e-6)
 
 
 def test_pushes_move_earlier_contacts():
