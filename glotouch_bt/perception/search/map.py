@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
 import scipy
 
-from glotouch_bt.perception.search.remaining import ANY, CROWDED, USUAL, DiscPrior, Remaining, chance_left, remaining
+from glotouch_bt.perception.search.remaining import (
+    ANY,
+    CROWDED,
+    USUAL,
+    DiscPrior,
+    Remaining,
+    chance_left,
+    discs,
+    remaining,
+)
 from glotouch_bt.perception.touch import Contact, Contour, signed_distance
 from glotouch_bt.robot import Array, ParamError, frozen_array
 
@@ -226,12 +235,12 @@ class SearchMap:
         """Return (n,) True for points (n, 2) that the tip's centre may visit."""
         return np.asarray(np.all(np.abs(points_K_m) <= self.half_extent_m + 1e-9, axis=1))
 
-    def path_distance(self, points_K_m: Array) -> Array:
-        """Return the distances (n,) of points (n, 2) from the nearest path sample; inf without a path."""
+    def path_distance(self, points_K_m: Array, within_m: float = np.inf) -> Array:
+        """Return the distances (n,) of points (n, 2) from the nearest path sample; inf beyond `within_m`."""
         points = np.asarray(points_K_m, dtype=np.float64).reshape(-1, 2)
         if len(self.path_K_m) == 0:
             return np.full(len(points), np.inf)
-        return np.asarray(self._tree.query(points)[0], dtype=np.float64)
+        return np.asarray(self._tree.query(points, distance_upper_bound=within_m)[0], dtype=np.float64)
 
     def reaches_beyond(self, before: SearchMap) -> bool:
         """Return True if the path leads to positions that it had not visited in an earlier state of this map."""
@@ -265,8 +274,8 @@ class SearchMap:
 
     def _remaining(self, prior: DiscPrior) -> Remaining:
         """Return where objects may still be: an obstacle hides none, because it is only a place of a contact."""
-        traced = [e.contour for e in self.exclusions if e.traced]
-        return remaining(self.half, prior, traced, self.path_distance, self.dropped)
+        gaps = [_gap(e, self.half, prior) for e in self.exclusions if e.traced]
+        return remaining(self.half, prior, gaps, self.path_distance, self.dropped)
 
     @cached_property
     def chance_left(self) -> float:
@@ -307,6 +316,12 @@ class SearchMap:
     @cached_property
     def _tree(self) -> scipy.spatial.cKDTree:
         return scipy.spatial.cKDTree(self.path_K_m)
+
+
+@lru_cache(maxsize=128)
+def _gap(exclusion: Exclusion, half: tuple[float, float], prior: DiscPrior) -> Array:
+    """Return the distances (g,) of a prior's positions from the outline of a traced object."""
+    return signed_distance(exclusion.contour, discs(half, prior).grid)
 
 
 def protrusion_m(contour: Contour) -> float:

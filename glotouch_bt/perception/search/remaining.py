@@ -28,7 +28,6 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from glotouch_bt.perception.touch import Contour, signed_distance
 from glotouch_bt.robot import Array
 
 DENSITY_PER_M2 = 40.0
@@ -133,8 +132,8 @@ class Remaining:
 def remaining(
     half: tuple[float, float],
     prior: DiscPrior,
-    traced: Sequence[Contour],
-    path_distance: Callable[[Array], Array],
+    gaps: Sequence[Array],
+    path_distance: Callable[[Array, float], Array],
     dropped: Array,
 ) -> Remaining:
     """Return the places and sizes of a prior that a search has not excluded.
@@ -142,16 +141,16 @@ def remaining(
     Args:
         half: Limits of the tip's centre, m.
         prior: The prior.
-        traced: Outlines of traced objects; nothing overlaps them.
-        path_distance: Distances (n,) of points (n, 2) from the swept path.
+        gaps: Distances (g,) of the positions from the outline of each traced object; nothing overlaps them.
+        path_distance: Distances (n,) of points (n, 2) from the swept path; it may be inf above a limit.
         dropped: (m, 2) positions given up.
     """
     every = discs(half, prior)
     beside = every.weight.copy()
-    for contour in traced:
-        gap = signed_distance(contour, every.grid)[every.place] - every.radius
+    for outside in gaps:
+        gap = outside[every.place] - every.radius
         beside *= np.where(gap < 0.0, 0.0, np.where(gap < prior.gap_m, prior.gap_weight, 1.0))
-    weight = np.where(path_distance(every.grid)[every.place] < every.reach, 0.0, beside)
+    weight = np.where(path_distance(every.grid, float(every.reach.max()))[every.place] < every.reach, 0.0, beside)
     if len(dropped):
         near = np.linalg.norm(every.grid[:, None] - dropped[None], axis=2).min(axis=1)
         weight[near[every.place] < prior.tip_radius_m] = 0.0

@@ -110,15 +110,15 @@ class Routes:
     def __init__(self, belief: SearchMap, start_K_m: Array) -> None:
         self._belief = belief
         self.start_K_m = np.asarray(start_K_m, dtype=np.float64)
-        self._tables: tuple[_Grid, Array, np.typing.NDArray[np.int32]] | None = None
+        self._tables: dict[float, tuple[_Grid, Array, np.typing.NDArray[np.int32]]] = {}
 
-    def lengths(self, goals_K_m: Array) -> Array:
-        """Return the route lengths (n,) to goals (n, 2), to a grid step; inf if unreachable."""
+    def lengths(self, goals_K_m: Array, within_m: float = np.inf) -> Array:
+        """Return the route lengths (n,) to goals (n, 2), to a grid step; inf if unreachable or beyond `within_m`."""
         goals = np.asarray(goals_K_m, dtype=np.float64).reshape(-1, 2)
         straight = np.asarray(np.linalg.norm(goals - self.start_K_m, axis=1))
         if not self._belief.exclusions or len(goals) == 0:
             return straight
-        _, distance, _ = self._solve()
+        _, distance, _ = self._solve(within_m)
         by_grid = distance[cells(self._belief.half, goals)]
         # Grid routes are up to 8 % longer than straight ones.
         return np.asarray(np.where(np.isfinite(by_grid), np.maximum(by_grid / 1.04, straight), np.inf))
@@ -140,21 +140,23 @@ class Routes:
         points = np.vstack([grid.nodes[chain[::-1]], goal])
         return self._pull_tight(points)
 
-    def _solve(self) -> tuple[_Grid, Array, np.typing.NDArray[np.int32]]:
-        if self._tables is None:
+    def _solve(self, within_m: float = np.inf) -> tuple[_Grid, Array, np.typing.NDArray[np.int32]]:
+        if within_m not in self._tables:
             half = self._belief.half_extent_m
             grid = _grid((float(half[0]), float(half[1])), self._belief.exclusions)
             node = grid.nearest_free(self.start_K_m)
             if node < 0:
                 n = len(grid.nodes)
-                self._tables = grid, np.full(n, np.inf), np.full(n, -1, dtype=np.int32)
+                self._tables[within_m] = grid, np.full(n, np.inf), np.full(n, -1, dtype=np.int32)
             else:
                 # The type stubs do not allow a single start index.
                 solve: Any = scipy.sparse.csgraph.dijkstra
-                distance, before = solve(grid.graph, directed=False, indices=node, return_predecessors=True)
+                distance, before = solve(
+                    grid.graph, directed=False, indices=node, return_predecessors=True, limit=within_m
+                )
                 distance = distance + np.linalg.norm(grid.nodes[node] - self.start_K_m)
-                self._tables = grid, distance, before
-        return self._tables
+                self._tables[within_m] = grid, distance, before
+        return self._tables[within_m]
 
     def _pull_tight(self, points: Array) -> Array | None:
         """Shortcut each waypoint to the farthest visible later one. The first leg may leave an envelope."""

@@ -32,6 +32,11 @@ SLACK_M = 0.002
 it would also reach. Source: ours; the map samples the executed path at this spacing."""
 SAMPLE_M = 0.008
 """Spacing of the points at which legs are checked against envelopes."""
+FIRST_M = 0.3
+"""Length of routes within which the first leg usually ends: more than enough nodes are nearer if the floor is free.
+Source: ours."""
+COLUMN_M = 0.010
+"""Width of the columns in which the discs are sorted."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,31 +83,53 @@ class _SearchLattice:
 
 @dataclass(frozen=True)
 class _Hidden:
-    """Discs that may hide something, by their first coordinate.
+    """Discs that may hide something, by column of `COLUMN_M` along x, and by y inside one.
 
     Attributes:
         centre, reach, weight: Of each disc (h, 2), (h,), (h,); see `Discs`. The reach is smaller by `SLACK_M`.
+        first: (c + 1,) discs of column i are first[i]..first[i + 1].
+        west_m: x of the first column's edge.
     """
 
     centre: Array
     reach: Array
     weight: Array
+    first: Indices
+    west_m: float
 
     @classmethod
     def of(cls, every: Discs, weight: Array, low: Array, high: Array) -> _Hidden:
         """Return the discs with a weight (h,) that a path between two corners (2,) of a region may touch."""
         centre, reach = every.centre, every.reach[:, None] - SLACK_M
         chosen = np.flatnonzero((weight > 0.0) & ((centre > low - reach) & (centre < high + reach)).all(axis=1))
-        chosen = chosen[np.argsort(centre[chosen, 0], kind="stable")]
-        return cls(centre[chosen], every.reach[chosen] - SLACK_M, weight[chosen])
+        return cls.sorted(centre[chosen], every.reach[chosen] - SLACK_M, weight[chosen])
+
+    @classmethod
+    def sorted(cls, centre: Array, reach: Array, weight: Array) -> _Hidden:
+        """Return discs by column, and by y inside one."""
+        west_m = float(centre[:, 0].min()) if len(centre) else 0.0
+        column = ((centre[:, 0] - west_m) / COLUMN_M).astype(np.int64)
+        order = np.lexsort((centre[:, 1], column))
+        first = np.searchsorted(column[order], np.arange(column.max(initial=-1) + 2))
+        return cls(centre[order], reach[order], weight[order], np.asarray(first), west_m)
 
 
-@compiled("f8[:, ::1]", "f8[::1]", "f8[:, ::1]", "i8[::1]", "f8[:, ::1]", "f8[:, ::1]", "b1")
-def _find(centre: Array, reach: Array, left: Array, rows: Indices, start: Array, end: Array, take: bool) -> Array:
+@compiled("f8[:, ::1]", "f8[::1]", "i8[::1]", "f8", "f8[:, ::1]", "i8[::1]", "f8[:, ::1]", "f8[:, ::1]", "b1")
+def _find(
+    centre: Array,
+    reach: Array,
+    first: Indices,
+    west: float,
+    left: Array,
+    rows: Indices,
+    start: Array,
+    end: Array,
+    take: bool,
+) -> Array:
     """Return the weight found on each leg (l,): that of the discs which the leg touches.
 
     Args:
-        centre, reach: (h, 2) and (h,) of the discs, by their first coordinate.
+        centre, reach, first, west: See `_Hidden`.
         left: (r, h) weights that are left; with `take`, those found on a leg are set to zero.
         rows: (l,) row of `left` for each leg.
         start, end: (l, 2) ends of the legs, m.
@@ -110,22 +137,28 @@ def _find(centre: Array, reach: Array, left: Array, rows: Indices, start: Array,
     """
     found = np.zeros(len(rows))
     farthest = reach.max() if len(reach) else 0.0
+    columns = len(first) - 1
     for leg in range(len(rows)):
         row, x, y = rows[leg], start[leg, 0], start[leg, 1]
         along_x, along_y = end[leg, 0] - x, end[leg, 1] - y
         length_2 = max(along_x * along_x + along_y * along_y, 1e-12)
-        low, high = min(x, end[leg, 0]) - farthest, max(x, end[leg, 0]) + farthest
-        i = np.searchsorted(centre[:, 0], low)
-        while i < len(centre) and centre[i, 0] <= high:
-            if left[row, i] > 0.0:
-                from_x, from_y = centre[i, 0] - x, centre[i, 1] - y
-                t = min(max((from_x * along_x + from_y * along_y) / length_2, 0.0), 1.0)
-                away_x, away_y = from_x - t * along_x, from_y - t * along_y
-                if away_x * away_x + away_y * away_y < reach[i] * reach[i]:
-                    found[leg] += left[row, i]
-                    if take:
-                        left[row, i] = 0.0
-            i += 1
+        low, high = min(y, end[leg, 1]) - farthest, max(y, end[leg, 1]) + farthest
+        left_edge, right_edge = min(x, end[leg, 0]) - farthest, max(x, end[leg, 0]) + farthest
+        for column in range(
+            max(int((left_edge - west) / COLUMN_M), 0), min(int((right_edge - west) / COLUMN_M) + 1, columns)
+        ):
+            i, beyond = first[column], first[column + 1]
+            i += np.searchsorted(centre[i:beyond, 1], low)
+            while i < beyond and centre[i, 1] <= high:
+                if left[row, i] > 0.0:
+                    from_x, from_y = centre[i, 0] - x, centre[i, 1] - y
+                    t = min(max((from_x * along_x + from_y * along_y) / length_2, 0.0), 1.0)
+                    away_x, away_y = from_x - t * along_x, from_y - t * along_y
+                    if away_x * away_x + away_y * away_y < reach[i] * reach[i]:
+                        found[leg] += left[row, i]
+                        if take:
+                            left[row, i] = 0.0
+                i += 1
     return found
 
 
@@ -201,10 +234,13 @@ class ExpectedFind:
         p = self.params
         lattice = _lattice(belief.half, p)
         free = _free_legs(lattice, belief.exclusions)
-        lengths = Routes(belief, tip).lengths(lattice.nodes)
-        straight = np.linalg.norm(lattice.nodes - tip, axis=1)
         # The first leg may be longer than a lattice leg, to leave fully explored surroundings.
-        near = np.argsort(np.where(np.isfinite(lengths), lengths, 9.0), kind="stable")[: 4 * p.width + 16]
+        count, routes = 4 * p.width + 16, Routes(belief, tip)
+        lengths = routes.lengths(lattice.nodes, FIRST_M)
+        if np.isfinite(lengths).sum() < count:
+            lengths = routes.lengths(lattice.nodes)
+        straight = np.linalg.norm(lattice.nodes - tip, axis=1)
+        near = np.argsort(lengths, kind="stable")[:count]
         near = near[
             np.isfinite(lengths[near]) & (straight[near] > 1e-3) & ~belief.inside_exclusion(lattice.nodes[near])
         ]
@@ -217,7 +253,9 @@ class ExpectedFind:
         left = np.repeat(discs.weight[None], len(near), axis=0)
 
         def find(rows: Indices, start: Array, end: Array, *, take: bool = False) -> Array:
-            return _find(discs.centre, discs.reach, left, rows, start, end, take)
+            return _find(
+                discs.centre, discs.reach, discs.first, discs.west_m, left, rows, start, end, take
+            )  # fmt: skip
 
         mass = find(np.arange(len(near)), np.repeat(tip[None], len(near), axis=0), goals, take=True)
         length = lengths[near]

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.perception.search import ExpectationParams, ExpectedFind, SearchMap
-from glotouch_bt.perception.search.policies.expectation import SLACK_M, _find, _Hidden, _lattice
+from glotouch_bt.perception.search.policies.expectation import COLUMN_M, SLACK_M, _find, _Hidden, _lattice
 from glotouch_bt.perception.search.remaining import USUAL
 from glotouch_bt.perception.touch import Contour
 
@@ -45,6 +45,12 @@ def test_before_any_search_the_weights_are_a_distribution_over_discs_that_fit() 
         assert weight[radius == r].sum() == pytest.approx(1.0 / len(USUAL.radii_m))
 
 
+def found_on(discs: _Hidden, left: np.ndarray, start: np.ndarray, end: np.ndarray, *, take: bool) -> np.ndarray:
+    """Weight found on legs, all with the first row of what is left."""
+    rows = np.zeros(len(start), dtype=np.int64)
+    return _find(discs.centre, discs.reach, discs.first, discs.west_m, left, rows, start, end, take)
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.tuples(coordinate, coordinate), st.tuples(coordinate, coordinate), st.floats(0.005, 0.05))
 def test_a_leg_finds_the_discs_that_it_comes_near(a: tuple[float, float], b: tuple[float, float], reach: float) -> None:
@@ -52,23 +58,30 @@ def test_a_leg_finds_the_discs_that_it_comes_near(a: tuple[float, float], b: tup
     start, end = np.array(a), np.array(b)
     line = start + np.linspace(0, 1, 2001)[:, None] * (end - start)
     centre = np.random.default_rng(0).uniform(-0.2, 0.2, (200, 2))
-    centre = centre[np.argsort(centre[:, 0])]
-    distance = np.linalg.norm(centre[:, None] - line[None], axis=2).min(axis=1)
+    discs = _Hidden.sorted(centre, np.full(200, reach), np.ones(200))
+    distance = np.linalg.norm(discs.centre[:, None] - line[None], axis=2).min(axis=1)
     clear = np.abs(distance - reach) > 2e-4  # of what is nearer the sampled line says nothing
-    left = np.ones((1, 200))
-    found = _find(centre, np.full(200, reach), left, np.zeros(1, dtype=np.int64), start[None], end[None], True)
+    left = discs.weight[None].copy()
+    found = found_on(discs, left, start[None], end[None], take=True)
     np.testing.assert_array_equal(left[0, clear] == 0.0, (distance < reach)[clear])
     assert found[0] == np.count_nonzero(left == 0.0)
 
 
 def test_weight_is_found_once_and_only_in_its_own_row() -> None:
     centre, reach = np.array([[0.0, 0.0], [0.1, 0.0]]), np.array([0.02, 0.02])
-    left = np.array([[0.25, 0.5], [0.25, 0.5]])
-    start, end, row = np.array([[0.0, 0.0]]), np.array([[0.2, 0.0]]), np.zeros(1, dtype=np.int64)
-    assert _find(centre, reach, left, row, start, end, False)[0] == 0.75
-    assert _find(centre, reach, left, row, start, end, True)[0] == 0.75
-    assert _find(centre, reach, left, row, start, end, True)[0] == 0.0
+    discs = _Hidden.sorted(centre, reach, np.array([0.25, 0.5]))
+    left = np.repeat(discs.weight[None], 2, axis=0)
+    start, end = np.array([[0.0, 0.0]]), np.array([[0.2, 0.0]])
+    assert found_on(discs, left, start, end, take=False)[0] == 0.75
+    assert found_on(discs, left, start, end, take=True)[0] == 0.75
+    assert found_on(discs, left, start, end, take=True)[0] == 0.0
     np.testing.assert_array_equal(left, [[0.0, 0.0], [0.25, 0.5]])
+
+
+def test_without_discs_nothing_is_found() -> None:
+    discs = _Hidden.sorted(np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+    start, end = np.array([[0.0, 0.0]]), np.array([[0.2, 0.0]])
+    assert found_on(discs, np.zeros((1, 0)), start, end, take=True)[0] == 0.0
 
 
 def test_discs_outside_the_region_of_the_paths_are_left_out_and_no_others() -> None:
@@ -78,7 +91,8 @@ def test_discs_outside_the_region_of_the_paths_are_left_out_and_no_others() -> N
     away = np.linalg.norm(np.maximum(np.maximum(low - every.discs.centre, every.discs.centre - high), 0.0), axis=1)
     assert some.weight.sum() >= every.weight[away < every.discs.reach - SLACK_M].sum()
     assert len(some.weight) < np.count_nonzero(every.weight)
-    assert np.all(np.diff(some.centre[:, 0]) >= 0.0)
+    assert np.ptp(some.centre[some.first[0] : some.first[1], 0]) <= COLUMN_M
+    assert np.all(np.diff(some.centre[some.first[0] : some.first[1], 1]) >= 0.0)
 
 
 def test_a_leg_and_its_reverse_have_one_track() -> None:
