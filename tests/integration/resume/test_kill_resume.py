@@ -19,7 +19,7 @@ world: container_five
 tree:
   sequence:
     - wait: {name: first, seconds: 2.0}
-    - wait: {name: second, seconds: 150.0}
+    - wait: {name: second, seconds: 450.0}
     - wait: {name: last, seconds: 2.0}
 """
 
