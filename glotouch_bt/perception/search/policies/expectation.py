@@ -33,10 +33,10 @@ it would also reach. Source: ours; the map samples the executed path at this spa
 SAMPLE_M = 0.008
 """Spacing of the points at which legs are checked against envelopes."""
 FIRST_M = 0.3
-"""Length of routes within which the first leg usually ends: more than enough nodes are nearer if the floor is free.
+"""Maximum length of the routes to the ends of the first leg; all routes are computed if too few nodes are that near.
 Source: ours."""
 COLUMN_M = 0.010
-"""Width of the columns in which the discs are sorted."""
+"""Width of the columns in which the discs are sorted. Source: ours."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -46,8 +46,9 @@ SHIFT_SD_M = 0.008
 MAX_MISFIT_INCREASE = 1.0
 """Maximum increase of the squared misfit by a correction, in variances; rounded corners cause about this much."""
 ROUNDS = 4
-"""Maximum number of times that free positions become active."""
-_HARMONICS = len(HARMONICS)
+"""Maximum number of times that further free positions become active. Source: ours."""
+HARMONIC_COUNT = len(HARMONICS)
+"""Number of harmonics; there are a cosine and a sine coefficient for each."""
 
 
 def infer_posteriors(
@@ -69,7 +70,7 @@ def infer_posteriors(
     offset = np.where(free, 0.0, before - params)
     sd[free] = math.sqrt(math.pi / 8)  # the density of a yaw anywhere in a quarter turn
     spread = COEFFICIENT_SD_M if shape is circle else np.minimum(COEFFICIENT_SD_M, COEFFICIENT_SD_M[2])
-    own = p + (2 * _HARMONICS if amplitude[0] > 0 else 0)
+    own = p + (2 * HARMONIC_COUNT if amplitude[0] > 0 else 0)
     n = own + (2 if touches.outliers else 0)
     mean, covariance, residuals, evidence = np.zeros((s, n)), np.zeros((s, n, n)), np.zeros((s, k)), np.zeros(s)
     _condition(
@@ -114,7 +115,8 @@ def _condition(
     Args:
         params, amplitude, scale: (s, p), (s,), (s,).
         points: (k + m, 2) contacts, then free positions.
-        normal, known, approach: (k,), (k,), (k, 2); `known` is 1 / the standard deviation of the normal.
+        normal, known, approach: (k,) bearings of the outward normals, rad; (k,) 1 / their standard deviations, 0 if
+            unknown; (k, 2) unit directions of approach.
         radius, contact_sd: Of the ball, and of its centre at a contact.
         moved: Number of first contacts made before the object moved by a common, unknown shift.
         offset, sd: (s, p), (p,) prior of the correction.
@@ -136,8 +138,8 @@ def _condition(
         for a in range(n):
             if a < shape_size:
                 its = sd[a]
-            elif deviating and a < shape_size + 2 * _HARMONICS:
-                its = amplitude[i] * spread[(a - shape_size) % _HARMONICS]
+            elif deviating and a < shape_size + 2 * HARMONIC_COUNT:
+                its = amplitude[i] * spread[(a - shape_size) % HARMONIC_COUNT]
             else:
                 its = SHIFT_SD_M
             full[a, a] = 1.0 / (its * its)
@@ -184,11 +186,11 @@ def _condition(
                 cosine, sine = np.cos(at), np.sin(at)
                 slope = max(np.cos(bearing - at), MIN_COSINE) / max(rho, 0.5 * MIN_SIZE_M)
                 wave_c, wave_s = 1.0, 0.0
-                for h in range(_HARMONICS):
+                for h in range(HARMONIC_COUNT):
                     wave_c, wave_s = wave_c * cosine - wave_s * sine, wave_c * sine + wave_s * cosine
-                    row[shape_size + h], row[shape_size + _HARMONICS + h] = -wave_c, -wave_s
+                    row[shape_size + h], row[shape_size + HARMONIC_COUNT + h] = -wave_c, -wave_s
                     turn[shape_size + h] = (h + 1) * wave_s * slope
-                    turn[shape_size + _HARMONICS + h] = -(h + 1) * wave_c * slope
+                    turn[shape_size + HARMONIC_COUNT + h] = -(h + 1) * wave_c * slope
             if moved:
                 before = 1.0 if j < moved else 0.0
                 for a in range(2):
