@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from glotouch_bt.lazy import load_all
 from glotouch_bt.mission import load_mission
 from glotouch_bt.mission.spec import Finding, MissionFaults
 from glotouch_bt.validation.seeded_mistakes.bench import alarms
@@ -19,6 +20,12 @@ def interruptible() -> Iterator[None]:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_functions() -> None:
+    """Load Numba and the machine code first: within a property's first example they would exceed its deadline."""
+    load_all()
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.perception.model_cache import target_model
 from glotouch_bt.perception.recognition.model import PadSpec, TargetHypothesis, TargetModel
 from glotouch_bt.robot import Array, ParamError
@@ -98,20 +99,45 @@ def _reach(mesh: Mesh, points_m: Array, quat: Quat) -> Array:
 
     The points (n, 3) are in the frame of the file.
     """
-    p = standing(replace(mesh, vertices_m=points_m), quat).vertices_m
-    angle = np.arange(BEARINGS) * (2 * np.pi / BEARINGS)
-    at = np.minimum((p[:, 2] / LEVEL_M).astype(np.int64), LEVELS - 1)
-    rising = np.argsort(at)
-    along = p[rising, :2] @ np.stack([np.cos(angle), np.sin(angle)])
-    levels, first = np.unique(at[rising], return_index=True)
+    placed = standing(replace(mesh, vertices_m=points_m), quat).vertices_m
     reach = np.zeros((BEARINGS, LEVELS))
-    reach[:, levels] = np.maximum.reduceat(along, first).T
+    _reach_of(np.ascontiguousarray(placed), reach)
     return reach
 
 
+@compiled("given f8[:, ::1]", "f8[:, ::1]")
+def _reach_of(points: Array, reach: Array) -> None:
+    """Fill the reach (BEARINGS, LEVELS) of points (n, 3) from the origin."""
+    seen = np.zeros(LEVELS, dtype=np.bool_)
+    cosine, sine = np.zeros(BEARINGS), np.zeros(BEARINGS)
+    for b in range(BEARINGS):
+        angle = b * (2.0 * np.pi / BEARINGS)
+        cosine[b], sine[b] = np.cos(angle), np.sin(angle)
+    for i in range(len(points)):
+        level = min(int(points[i, 2] / LEVEL_M), LEVELS - 1)
+        for b in range(BEARINGS):
+            along = cosine[b] * points[i, 0] + sine[b] * points[i, 1]
+            if not seen[level] or along > reach[b, level]:
+                reach[b, level] = along
+        seen[level] = True
+
+
+@compiled("f8[:, ::1]", "f8[:, ::1]")
 def _is_alike(a: Array, b: Array) -> bool:
     """Return True if two sides reach equally far, but for a turn about the vertical."""
-    used = (a != 0).any(axis=0) | (b != 0).any(axis=0)
-    bearing = np.arange(BEARINGS)
-    turned = a[:, used][bearing - bearing[:, None]]  # by each number of bearings
-    return bool(np.sqrt(((turned - b[:, used]) ** 2).mean(axis=(1, 2))).min() < ALIKE_M)
+    used = np.zeros(LEVELS, dtype=np.bool_)
+    for i in range(BEARINGS):
+        for level in range(LEVELS):
+            used[level] |= a[i, level] != 0.0 or b[i, level] != 0.0
+    limit = ALIKE_M * ALIKE_M * BEARINGS * used.sum()
+    for turn in range(BEARINGS):
+        square = 0.0
+        for i in range(BEARINGS):
+            for level in range(LEVELS):
+                off = a[(i + turn) % BEARINGS, level] - b[i, level]
+                square += off * off
+            if square >= limit:
+                break
+        if square < limit:
+            return True
+    return False

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
+from glotouch_bt.compiled import compiled
 from glotouch_bt.robot.geometry import Array, quat_to_matrix
 from glotouch_bt.robot.scene.meshes import Mesh
 
@@ -22,8 +21,6 @@ BASE_M = 0.0001
 MIN_MARGIN_M = 0.002
 """Least distance of the centre of mass from the edge of the support polygon; on less an object rolls on. Source:
 ours."""
-PLANES_AT_ONCE = 256
-"""Number of planes whose distances from all corners are computed together: 5 MB on a hull of 2600 corners."""
 
 
 def turned(mesh: Mesh, quat: Quat) -> Mesh:
@@ -97,20 +94,40 @@ def _stances(key: ByDigest) -> tuple[tuple[Quat, ...], tuple[float, ...]]:
     normals, corners = hull.equations[:, :3], points[hull.vertices] - centre
     angles = _solid_angles(points[hull.simplices] - centre)
     along = np.linalg.svd(normals[:, None])[2][:, 1:]  # two axes in each plane
-    bases = _bases(points[hull.vertices], hull.equations)
+    heights = hull.equations[:, 3] + normals @ centre
+    around = np.zeros(len(normals))
+    _around(corners, np.ascontiguousarray(normals), heights, np.ascontiguousarray(along), around)
     sides: dict[bytes, tuple[Array, float]] = {}
-    for base, normal, axes, angle in zip(bases, normals, along, angles, strict=True):
-        if _margin_m(corners[base] @ axes.T) >= MIN_MARGIN_M:
-            first, total = sides.get(base.tobytes(), (normal, 0.0))
-            sides[base.tobytes()] = first, total + float(angle)
+    for i in np.flatnonzero(around >= MIN_MARGIN_M):
+        base = np.flatnonzero(corners @ normals[i] + heights[i] >= -BASE_M)
+        if _margin_m(corners[base] @ along[i].T) >= MIN_MARGIN_M:
+            first, total = sides.get(base.tobytes(), (normals[i], 0.0))
+            sides[base.tobytes()] = first, total + float(angles[i])
     return tuple(_onto_floor(normal) for normal, _ in sides.values()), tuple(total for _, total in sides.values())
 
 
-def _bases(corners: Array, planes: Array) -> Iterator[npt.NDArray[np.int64]]:
-    """Yield the numbers of the corners (m, 3) that carry a hull on each of its planes (n, 4)."""
-    for some in np.array_split(planes, -(-len(planes) // PLANES_AT_ONCE)):
-        for carrying in some[:, :3] @ corners.T + some[:, 3:] >= -BASE_M:
-            yield np.flatnonzero(carrying)
+@compiled("given f8[:, ::1]", "f8[:, ::1]", "f8[:]", "f8[:, :, ::1]", "f8[::1]")
+def _around(corners: Array, normals: Array, heights: Array, along: Array, around: Array) -> None:
+    """Fill the distances (n,) of the centre of mass from the edge of the bounding box of each support polygon.
+
+    Args:
+        corners: (m, 3) corners of the hull, from the centre of mass.
+        normals, heights: (n, 3), (n,) the hull's planes: `normal . corner + height` is at most 0.
+        along: (n, 2, 3) two axes in each plane.
+        around: (n,) filled; negative if the centre is outside.
+    """
+    for i in range(len(normals)):
+        low_u = low_v = np.inf
+        high_u = high_v = -np.inf
+        for j in range(len(corners)):
+            x, y, z = corners[j, 0], corners[j, 1], corners[j, 2]
+            if normals[i, 0] * x + normals[i, 1] * y + normals[i, 2] * z + heights[i] < -BASE_M:
+                continue
+            u = along[i, 0, 0] * x + along[i, 0, 1] * y + along[i, 0, 2] * z
+            v = along[i, 1, 0] * x + along[i, 1, 1] * y + along[i, 1, 2] * z
+            low_u, high_u = min(low_u, u), max(high_u, u)
+            low_v, high_v = min(low_v, v), max(high_v, v)
+        around[i] = min(min(-low_u, high_u), min(-low_v, high_v))
 
 
 def _solid_angles(corners: Array) -> Array:
@@ -139,9 +156,6 @@ def _margin_m(base_m: Array) -> float:
     Args:
         base_m: Points (n, 2) in its plane, from the foot of the centre of mass.
     """
-    around = min(*base_m.max(axis=0), *-base_m.min(axis=0))  # to the edge of the bounding box
-    if around < MIN_MARGIN_M:
-        return float(around)
     try:
         hull = scipy.spatial.ConvexHull(base_m)
     except (scipy.spatial.QhullError, ValueError):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import Array, ParamError
 
 Indices = npt.NDArray[np.int64]
+FLAT_M2 = 1e-14
+"""Twice the area of three neighbouring points of a hull up to which the middle one is no corner. Source: rounding."""
 
 
 def convex_hull(points_m: Array) -> Array:
@@ -18,10 +19,41 @@ def convex_hull(points_m: Array) -> Array:
     Raises:
         ParamError: The points span no area.
     """
-    try:
-        return np.asarray(points_m[scipy.spatial.ConvexHull(points_m).vertices], dtype=np.float64)
-    except (scipy.spatial.QhullError, ValueError) as error:
-        raise ParamError("points_m", np.shape(points_m), "at least three points that span an area") from error
+    order = np.lexsort((points_m[:, 1], points_m[:, 0]))
+    corners = np.zeros(len(order) + 1, dtype=np.int64)
+    count = _hull(points_m, order, corners) if np.isfinite(points_m).all() else 0
+    if count < 3:
+        raise ParamError("points_m", np.shape(points_m), "at least three points that span an area")
+    return np.asarray(points_m[corners[:count]], dtype=np.float64)
+
+
+@compiled("given f8[:, :]", "i8[::1]", "i8[::1]")
+def _hull(points: Array, order: Indices, corners: Indices) -> int:
+    """Fill the corners of the convex hull of points (n, 2), counter-clockwise, and return their number.
+
+    The lower chain, then the upper one (Andrew, IPL 9, 1979). Without an area there are fewer than three.
+
+    Args:
+        points: (n, 2), finite.
+        order: (n,) their order by x, then y.
+        corners: (n + 1,) filled.
+    """
+    kept = 0
+    for chain in range(2):
+        first = kept
+        for k in range(len(order)):
+            i = order[k] if chain == 0 else order[len(order) - 1 - k]
+            while kept - first > 1:
+                a, b = corners[kept - 2], corners[kept - 1]
+                left = (points[b, 0] - points[a, 0]) * (points[i, 1] - points[a, 1])
+                left -= (points[b, 1] - points[a, 1]) * (points[i, 0] - points[a, 0])
+                if left > FLAT_M2:
+                    break
+                kept -= 1
+            corners[kept] = i
+            kept += 1
+        kept -= 1  # the last one starts the other chain
+    return kept
 
 
 def star_hull(points_m: Array) -> Indices:

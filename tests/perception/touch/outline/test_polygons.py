@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -67,14 +68,45 @@ def test_distance_of_an_l():
     np.testing.assert_array_equal(got < 0, (x > 0) & (y > 0) & (((x < 6) & (y < 2)) | ((x < 2) & (y < 5))))
 
 
-def test_points_without_area_have_no_hull():
+@given(st.integers(0, 10_000), st.booleans())
+def test_convex_hull_equals_qhull(seed, on_grid):
+    """With points on a grid, many coincide or lie on one line; Qhull then keeps some that are no corners."""
+    rng = np.random.default_rng(seed)
+    points = rng.normal(0, 0.03, (int(rng.integers(4, 60)), 2))
+    points = np.round(points, 2) if on_grid else points
+    try:
+        want = scipy.spatial.ConvexHull(points)
+    except scipy.spatial.QhullError:
+        with pytest.raises(ParamError):
+            convex_hull(points)
+        return
+    got = convex_hull(points)
+    area, _ = area_and_centroid(got)
+    assert area == pytest.approx(want.volume)
+    assert (polygon_distance(got, points) < 1e-9).all()
+    if not on_grid:
+        first = int(np.flatnonzero((points[want.vertices] == got[0]).all(axis=1))[0])
+        np.testing.assert_array_equal(got, points[np.roll(want.vertices, -first)])
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        np.zeros((0, 2)),
+        np.zeros((1, 2)),
+        np.zeros((5, 2)),
+        np.linspace(0, 0.1, 7)[:, None] * [0.6, 0.8] + [0.3, -0.1],
+        np.array([[0, 0], [1, 0], [1, 1], [np.nan, 0]]),
+    ],
+)
+def test_points_without_area_have_no_hull(points):
     with pytest.raises(ParamError):
-        convex_hull(np.zeros((5, 2)))
+        convex_hull(points)
 
 
 @given(st.integers(0, 10_000))
 def test_star_hull_equals_the_convex_hull(seed):
-    """Against Qhull, for random distances along evenly spaced rays."""
+    """For random distances along evenly spaced rays."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(8, 80))
     bearing = np.linspace(-np.pi, np.pi, n, endpoint=False)
