@@ -274,6 +274,30 @@ def test_what_is_too_long_for_one_object_is_two(world_of: WorldOf) -> None:
         assert not state.keep_one(state.outline(), TraceParams())
 
 
+def test_a_trace_that_drops_contacts_again_and_again_ends(world_of: WorldOf, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whenever a third contact was made, two are dropped as another object's, so the trace never has enough."""
+
+    def keep_one(self: TraceState, outline: object, p: TraceParams) -> bool:
+        dropping = len(self.raw) > 2
+        if dropping:
+            del self.raw[:-1]
+            self.blocked.clear()
+        return dropping
+
+    monkeypatch.setattr(TraceState, "keep_one", keep_one)
+    world, felt = world_of([cylinder(0.03)], [(*CENTRE, 0)]), []
+    first = touched_from(world, 0.3)
+
+    def execute(move: Move) -> MoveOutcome:
+        outcome = world.execute(move)
+        felt.append(outcome.contact is not None)
+        return outcome
+
+    result = drive(trace(first, world.tip_K_m, TIP, TraceParams(max_contacts=6), half_extent_m=INNER), execute)
+    assert "other objects" in result.ended
+    assert sum(felt) == 2 * 6
+
+
 def test_the_end_of_an_unnoticed_contact_is_no_other_object(world_of: WorldOf) -> None:
     """The tool was pushed against the disc with too little force. When it leaves, the force changes inwards."""
     world = world_of([cylinder(0.03)], [(*CENTRE, 0)])

@@ -26,6 +26,9 @@ OWN_M = 0.030
 """Maximum distance from a lone contact of another contact with the same object; objects stand farther apart."""
 LOST = 2
 """Number of consecutive misses around a lone contact after which both its sides are probed."""
+ALL_CONTACTS = 2
+"""Maximum number of new contacts of a trace, as a multiple of `max_contacts`, with those that were dropped as another
+object's. Between objects that touch, a trace can otherwise pass from one to the other for ever. Source: ours."""
 INSIDE_M = 0.004
 """Distance from the predicted centre at which a probe ends: nothing is there."""
 
@@ -133,9 +136,11 @@ def _until_known(
 
     After a surprising contact, test at each contact whether the object has moved unobserved (needs three contacts).
     """
-    outline, missed, ended, about = s.outline(), 0, "", False
+    outline, missed, touches, ended, about = s.outline(), 0, 0, "", False
     while not ended:
         ended = _enough(outline, s, p)
+        if touches >= ALL_CONTACTS * p.max_contacts:
+            ended = f"{touches} contacts, some of them with other objects"
         if not ended and joined is not None and len(s.raw) >= p.min_contacts and joined(s.present()):
             ended = "it is an object that is known"
         if ended:
@@ -151,6 +156,7 @@ def _until_known(
         else:
             bearing, s.side = aim.bearing, s.side or aim.side
             found = yield from _probe_at(outline, s, p, aim)
+        touches += found is not None
         if found is None:
             missed += 1
             s.blocked.append(bearing)
