@@ -83,12 +83,12 @@ def seek(
                 return Sought(belief, None, lowered, tip)
             hops += 1
             stretch, cornered = Stretch(spot[None, :], raised=True), False
-        for waypoint in stretch.waypoints_K_m:
+        for waypoint, goal in zip((*stretch.waypoints_K_m, *stretch.further_K_m), stretch.goals_K_m, strict=True):
             beside = bool(belief.inside_exclusion(tip[None])[0])
             outcome = yield Move("hop" if stretch.raised else "sweep", waypoint)
             tip, belief = outcome.tip_K_m, belief.with_path(outcome.path_K_m)
             if outcome.refused:
-                belief = belief.with_dropped(stretch.waypoints_K_m[-1])
+                belief = belief.with_dropped(goal)
                 break
             if stretch.raised:
                 lowered = outcome.contact is None

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.search import Move, MoveOutcome, SearchMap, Sought, Stretch, seek
+from glotouch_bt.perception.search.policies.expectation import ExpectedFind
 from glotouch_bt.perception.search.seeking import MAX_HOPS, RETREAT_M
 from glotouch_bt.perception.touch import Contact, Contour
 from glotouch_bt.robot import Array
@@ -61,6 +62,27 @@ def test_the_way_becomes_evidence_until_the_policy_has_none_left() -> None:
     assert [m.kind for m in moves] == ["sweep", "sweep"]
     assert (sought.contact, sought.lowered) == (None, True)
     assert sought.belief.path_distance(np.array([[0.05, -0.1], [0.1, 0.0]])).max() < 0.0021
+
+
+def test_a_refused_sweep_drops_its_own_goal() -> None:
+    """Not that of a later leg of the same plan: the next plan would begin with the refused leg again."""
+
+    def answer(move: Move, tip: Array) -> MoveOutcome:
+        if move.kind == "sweep" and move.goal_K_m[0] > 0.0:
+            return MoveOutcome(tip, np.zeros((0, 2)), refused="out of reach")
+        return free(move, tip)
+
+    start = np.array([-0.01, 0.0])
+    sought, moves = run(seek(blank(), ExpectedFind(), start, lowered=True), start, answer)
+    refused = [m.goal_K_m for m in moves if m.kind == "sweep" and m.goal_K_m[0] > 0.0]
+    assert refused
+    assert len(np.unique(refused, axis=0)) == len(refused)
+    assert sought.contact is None
+
+
+def test_further_goals_follow_a_way_in_straight_sweeps() -> None:
+    stretch = Stretch(np.array([[0.0, 0.1], [0.1, 0.1]]), further_K_m=np.array([[0.1, 0.0]]))
+    np.testing.assert_array_equal(stretch.goals_K_m, [[0.1, 0.1], [0.1, 0.1], [0.1, 0.0]])
 
 
 def test_a_contact_ends_it_and_the_ball_has_retreated() -> None:

@@ -227,14 +227,15 @@ class ExpectedFind:
             if len(legs):
                 way = legs[:1] if segment_is_free(belief, tip, legs[0]) else Routes(belief, tip).to(legs[0])
                 if way is not None:
-                    return Stretch(np.concatenate([way, legs[1:]]))
+                    return Stretch(way, further_K_m=legs[1:])
         return self._rest.next_stretch(belief, tip)
 
     def _first_legs(self, belief: SearchMap, tip: Array, hidden: Remaining) -> Array:
         """Return the ends (k, 2) of the best path's first `EXECUTED_LEGS` legs; none if no path finds anything."""
         p = self.params
         lattice = _lattice(belief.half, p)
-        free = _free_legs(lattice, belief.exclusions)
+        dropped = belief.is_dropped(lattice.nodes)
+        free = _free_legs(lattice, belief.exclusions) & ~dropped[lattice.ends[:, 1]]
         # The first leg may be longer than a lattice leg, to leave fully explored surroundings.
         count, routes = 4 * p.width + 16, Routes(belief, tip)
         lengths = routes.lengths(lattice.nodes, FIRST_M)
@@ -245,7 +246,7 @@ class ExpectedFind:
         near = near[
             np.isfinite(lengths[near]) & (straight[near] > 1e-3) & ~belief.inside_exclusion(lattice.nodes[near])
         ]
-        near = near[~belief.is_dropped(lattice.nodes[near])]
+        near = near[~dropped[near]]
         if len(near) == 0:
             return np.zeros((0, 2))
         goals, ahead_m = lattice.nodes[near], (p.depth - 1) * p.leg_m

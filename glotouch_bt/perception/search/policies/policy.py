@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
+
+import numpy as np
 
 from glotouch_bt.perception.search.map import SearchMap
 from glotouch_bt.robot import Array
@@ -14,12 +16,19 @@ class Stretch:
     """Next path of the ball.
 
     Attributes:
-        waypoints_K_m: (k, 2) positions of the ball's centre, in order, outside all envelopes.
-        raised: True: hop above the objects to the last waypoint. False: sweep at sensing height.
+        waypoints_K_m: (k, 2) positions of the ball's centre, in order, outside all envelopes; the last one is the goal.
+        raised: True: hop above the objects to the goal. False: sweep at sensing height.
+        further_K_m: (n, 2) goals of straight sweeps after that, if nothing was felt.
     """
 
     waypoints_K_m: Array
     raised: bool = False
+    further_K_m: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+    @property
+    def goals_K_m(self) -> Array:
+        """Return the goal (k + n, 2) of the way to each waypoint, then the further goals."""
+        return np.concatenate([self.waypoints_K_m[-1:].repeat(len(self.waypoints_K_m), axis=0), self.further_K_m])
 
 
 class SearchPolicy(Protocol):
