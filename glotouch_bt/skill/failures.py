@@ -22,7 +22,7 @@ class Reason:
 
     code: str
     message: str
-    evidence: Mapping[str, float | int | str] = field(default_factory=dict)
+    evidence: Mapping[str, float | int | str | bool] = field(default_factory=dict)
     advice: str = ""
     node: str = ""
 
@@ -30,7 +30,7 @@ class Reason:
 class SkillFailed(GlotouchError):
     """Raised inside `run` to end the skill with FAILURE."""
 
-    def __init__(self, code: str, message: str, *, advice: str = "", **evidence: float | int | str) -> None:
+    def __init__(self, code: str, message: str, *, advice: str = "", **evidence: float | int | str | bool) -> None:
         super().__init__(message)
         self.reason = Reason(code, message, evidence, advice)
 
@@ -51,7 +51,7 @@ class Failure:
     meaning: str
     advice: str = ""
 
-    def __call__(self, message: str, *, advice: str = "", **evidence: float | int | str) -> SkillFailed:
+    def __call__(self, message: str, *, advice: str = "", **evidence: float | int | str | bool) -> SkillFailed:
         """Return the exception to raise: one sentence with numbers, other advice if given, and the evidence."""
         return SkillFailed(self.code, message, advice=advice or self.advice, **evidence)
 

@@ -40,7 +40,7 @@ def _place(error: BaseException) -> str:
     return f" ({Path(outside[-1].filename).name}:{outside[-1].lineno}; --debug shows the traceback)" if outside else ""
 
 
-def _evidence(error: BaseException) -> dict[str, float | int | str]:
+def _evidence(error: BaseException) -> dict[str, float | int | str | bool]:
     """Return the values a backend error carries, by name."""
     if not isinstance(error, BackendError):
         return {}

@@ -52,7 +52,7 @@ dtypes = st.sampled_from([np.float64, np.float32, np.int64, np.int32, np.uint8, 
 arrays = dtypes.flatmap(lambda d: hnp.arrays(d, hnp.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4)))
 
 
-evidence = st.one_of(st.integers(), st.floats(), st.text(max_size=8))
+evidence = st.one_of(st.integers(), st.floats(), st.booleans(), st.text(max_size=8))
 
 
 def _reason(parts: Any) -> Reason:
