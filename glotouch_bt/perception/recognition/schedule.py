@@ -19,9 +19,9 @@ CHANGE_S = 42.0
 """Robot time of taking the probe once more: `tool_pickup`, `tool_calibrate` and `tool_return`. Source: measured, mean
 of 60 nominal missions."""
 
-MAX_ABSENT = 0.1
-"""Maximum probability of an absent target at which a candidate is taken for the target. Source: ours; half of what
-`match` allows."""
+MAX_ABSENT = 0.03
+"""Probability of an absent target at which closures on the likeliest candidate end. Source: the largest share of wrong
+objects that the project allows. `match` still accepts from a lower probability if no closure is left."""
 POSE_LAYERS = 2.0
 """Minimum number of two-sided layers for a pose at which a grasp can be planned. Source: ours."""
 
