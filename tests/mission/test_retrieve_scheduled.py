@@ -36,6 +36,14 @@ def test_every_skill_is_told_the_target(retrieve: Run) -> None:
     assert {c.params.target for c in rest} == {""}, "the rest is measured whatever the target"
 
 
+def test_every_closure_is_told_the_confidence(retrieve: Run) -> None:
+    refused = {f"match{n}": REFUSED for n in ("", " 2", " 3", " 4")}
+    run = scheduled(retrieve, {**refused, "touch_next*": DECIDED, "orbit_probe": found(2)}, 0, confidence="0.9")
+    told = [c.params.confidence for c in run.calls if hasattr(c.params, "confidence")]
+    assert len(told) >= 4, "every stage of the recognition closes the jaws"
+    assert set(told) == {0.9}
+
+
 def test_what_is_excluded_is_neither_refined_nor_topped(retrieve: Run) -> None:
     run = scheduled(retrieve, {"orbit_probe": found(3), "touch_next*": DECIDED}, 1)
     assert run.succeeded
