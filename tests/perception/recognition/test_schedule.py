@@ -148,7 +148,7 @@ def test_an_unknown_candidate_is_an_error(target, model) -> None:
     ("target_p", "rival_p", "absent_p", "sure"),
     [
         (0.975, 0.010, 0.015, True),
-        (0.968, 0.005, 0.027, True),  # known which one; turned by closures, it fits no target well
+        (0.968, 0.005, 0.027, True),  # known which one, and almost surely there
         (0.955, 0.005, 0.040, False),  # perhaps none of them
         (0.960, 0.035, 0.005, False),  # perhaps the other one
     ],
