@@ -35,7 +35,8 @@ class NextProbe(Skill):
     """Choose the measurement that is expected to tell most per second about which candidate is the target.
 
     Repeat it, and make what it chose with `refine_outline` or `touch_top`, until `measured_enough`. A candidate that
-    the target's STL excludes already is not measured. Without a target all are, the least certain outline first.
+    the target's STL excludes already is not measured. One that is probably not needed is put off, but only until the
+    jaws have been used. Without a target all are measured, the least certain outline first.
 
     Two candidates that are one body become one in `candidates`: they overlap, or they are parts of the target.
 
@@ -107,7 +108,8 @@ class NextProbe(Skill):
         felt = {t.candidate.index: t.sequences for t in self.felt or ()}
         touchsets = tuple(TouchSet(c, felt.get(c.index, ())) for c in candidates)
         belief = recognition.infer_belief(model, touchsets)
-        chosen = next_probe_touch(belief, [self._option(c, left) for c in candidates if c.index in _indices(left)])
+        options = [self._option(c, left) for c in candidates if c.index in _indices(left)]
+        chosen = next_probe_touch(belief, options, can_wait=self.felt is None)
         out = excluded(belief)
         self.postponed = len(_indices(left) - out)
         why = "most expected gain per second" if chosen else "every other candidate is excluded"

@@ -55,17 +55,21 @@ def excluded(belief: Belief) -> frozenset[int]:
     return frozenset(out - {best_of(belief).index})
 
 
-def next_probe_touch(belief: Belief, options: Sequence[ProbeOption]) -> ProbeOption | None:
+def next_probe_touch(belief: Belief, options: Sequence[ProbeOption], *, can_wait: bool = True) -> ProbeOption | None:
     """Return the option with the most gain per second, alone or with `then`; None if none is worth its time.
 
-    An option on an excluded candidate is not, nor is one that can be put off (`pays_now`).
+    An option on an excluded candidate is not.
 
     Args:
         belief: What is known.
         options: One for each candidate that was not measured completely.
+        can_wait: Leave out what is better put off until the jaws have been used (`pays_now`). False if they have been
+            used: then the target is hardly one of the measured candidates.
     """
     out, unmeasured = excluded(belief), {o.touch.candidate for o in options}
-    left = [o for o in options if o.touch.candidate not in out and pays_now(belief, o, unmeasured)]
+    left = [o for o in options if o.touch.candidate not in out]
+    if can_wait:
+        left = [o for o in left if pays_now(belief, o, unmeasured)]
     if not left:
         return None
     touches = [t for o in left for t in (o.touch, o.then) if t is not None]

@@ -132,6 +132,16 @@ def test_what_is_probably_not_needed_is_put_off(target, model, seconds: float) -
     assert pays_now(belief, option(1, "top", seconds), {0, 1}) == (now_s <= later_s), "the likeliest one comes first"
 
 
+def test_nothing_is_put_off_twice(target, model) -> None:
+    """Once the jaws have been used in vain, waiting would only cost one more change of tool."""
+    belief = believed(model, candidate(target, 0), candidate(target, 1, UNKNOWN_M))
+    slow = option(1, "top", 200.0)
+    assert next_probe_touch(belief, [slow]) is None
+    chosen = next_probe_touch(belief, [slow], can_wait=False)
+    assert chosen is not None
+    assert chosen.touch.candidate == 1
+
+
 def test_time_counts(target, model) -> None:
     belief = believed(model, candidate(target, 0, UNKNOWN_M), candidate(target, 1, UNKNOWN_M))
     chosen = next_probe_touch(belief, [option(0, "top", 20.0), option(1, "top", 10.0)])

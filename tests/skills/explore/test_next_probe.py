@@ -9,6 +9,7 @@ import trimesh
 from py_trees.common import Status
 
 from glotouch_bt.perception.recognition import ProbeTouch
+from glotouch_bt.perception.touch import TouchSet
 from glotouch_skills.explore.next_probe import NextProbe
 
 
@@ -68,6 +69,16 @@ def test_with_a_target_only_what_may_be_it_is_measured(asked, things) -> None:
     assert {i for i, _ in made} == {0}
     assert sorted(part for _, part in made) == ["outline", "top"]
     assert last.unmeasured == 2
+
+
+def test_what_was_put_off_is_measured_once_the_jaws_were_used(asked, found) -> None:
+    things = found.round((0.0, 0.0), 0.03), found.round((0.1, 0.0), 0.031, index=1)
+    known = tuple(replace(c, top_touched=False) for c in things)  # no top was met
+    before = tuple(ProbeTouch(0, part) for part in ("outline", "top"))
+    first = asked(known, "can", before=before)
+    assert (first.measured_enough, first.postponed) == (True, 1)
+    again = asked(known, "can", before=before, felt=(TouchSet(known[0], ()),))
+    assert (again.candidate.index, again.next_part) == (1, "outline")
 
 
 def test_what_was_measured_last_replaces_what_was_known(asked, things) -> None:
