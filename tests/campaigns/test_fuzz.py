@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import resource
 import subprocess
 import sys
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from pathlib import Path
@@ -28,6 +30,15 @@ MISSIONS = KINDS["missions"]
 
 def drawn(seed: int, n: int) -> tuple[str, bytes]:
     return document_of(stream_of(seed, n))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def limits() -> Iterator[None]:
+    """Give back the memory and the bytecode that a trial's watch denies its process."""
+    memory, bytecode = resource.getrlimit(resource.RLIMIT_AS), sys.dont_write_bytecode
+    yield
+    resource.setrlimit(resource.RLIMIT_AS, memory)
+    sys.dont_write_bytecode = bytecode
 
 
 def test_a_trial_is_the_same_whenever_it_is_made() -> None:
