@@ -196,27 +196,35 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
 def separated(admitted: Admitted, radius_m: float, exclusion_m: float) -> Admitted:
     """Divide anew the contacts of candidates whose outlines overlap, the deepest overlap first: bodies do not overlap.
 
+    No two groups of contacts are divided twice: among three candidates, the best divisions of the pairs may go round in
+    a circle.
+
     Args:
         admitted: Map and candidates.
         radius_m: Radius of the ball; 0 for another section, whose candidates are left as they are.
         exclusion_m: Margin around the objects that the search avoids.
     """
-    tried: list[tuple[Candidate, Candidate]] = []
+    tried: set[frozenset[frozenset[int]]] = set()
     while radius_m > 0.0:
-        pairs = (p for p in combinations(admitted.candidates, 2) if not any(p[0] is a and p[1] is b for a, b in tried))
+        pairs = (p for p in combinations(admitted.candidates, 2) if _groups(*p) not in tried)
         deepest = max(((_overlap_m(*p), p) for p in pairs), key=lambda found: found[0], default=None)
         if deepest is None or deepest[0] < OVERLAP_M:
             break
         one, other = deepest[1]
-        tried.append((one, other))
+        tried.add(_groups(one, other))
         parts = redivided(one.contacts, other.contacts, radius_m, admitted.belief.path_K_m)
         if parts:
             every = {c.index: c for c in admitted.candidates}
             changed = tuple(dict.fromkeys((*admitted.changed, one.index, other.index)))
             now = _shared_out(replace(admitted, changed=changed), every, (one, other), parts, radius_m, exclusion_m)
             admitted = replace(now, index=admitted.index)
-            tried.append((every[one.index], every[other.index]))
+            tried.add(_groups(every[one.index], every[other.index]))
     return admitted
+
+
+def _groups(a: Candidate, b: Candidate) -> frozenset[frozenset[int]]:
+    """Return what tells two groups of contacts apart from others; contacts are handed on, never copied."""
+    return frozenset(frozenset(map(id, candidate.contacts)) for candidate in (a, b))
 
 
 def _overlap_m(a: Candidate, b: Candidate) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import glotouch_bt.perception.search.bodies as search_bodies
+import glotouch_bt.perception.search.candidates as search_candidates
 from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit
 from glotouch_bt.perception.search.bodies import (
     Doubt,
@@ -20,7 +21,7 @@ from glotouch_bt.perception.search.bodies import (
     outline_of,
     redivided,
 )
-from glotouch_bt.perception.search.candidates import divided, quality, regroup, separated
+from glotouch_bt.perception.search.candidates import Admitted, divided, quality, regroup, separated
 from glotouch_bt.perception.touch import Candidate, Contact
 
 R = 0.006
@@ -241,3 +242,26 @@ def test_candidates_that_overlap_become_the_bodies_that_do_not() -> None:
     assert after.candidates[2] is far
     assert after.belief.found == 3
     assert separated(before, 0.0, 0.01) is before, "contacts of fingers are too far off"
+
+
+def test_divisions_that_go_round_in_a_circle_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each pair of three candidates hands the same contact on: without a memory of its divisions it never ends."""
+    shared = contact(0.0, 0.0, 0.0)
+    apart = [disc(x, 0.1, 0.02, (0, 60, 120, 180, 240, 300)) for x in (-0.1, 0.0, 0.1)]
+    known = tuple(candidate(i, (*own, shared) if i == 0 else own) for i, own in enumerate(apart))
+    calls: list[int] = []
+
+    def handed_on(one: tuple[Contact, ...], other: tuple[Contact, ...], *_: object) -> tuple[tuple[Contact, ...], ...]:
+        calls.append(len(calls))
+        assert len(calls) < 100
+        if not any(c is shared for c in (*one, *other)):
+            return ()
+        giver, taker = (one, other) if any(c is shared for c in one) else (other, one)
+        return tuple(c for c in giver if c is not shared), (*taker, shared)
+
+    monkeypatch.setattr(search_candidates, "redivided", handed_on)
+    monkeypatch.setattr(search_candidates, "_overlap_m", lambda a, b: 1.0)
+    blank = SearchMap.blank(np.array([0.2, 0.275]), 3)
+    after = separated(Admitted(blank, known, 0, ()), R, 0.01)
+    assert sum(any(c is shared for c in k.contacts) for k in after.candidates) == 1
+    assert sum(len(k.contacts) for k in after.candidates) == 19
