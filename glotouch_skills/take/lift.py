@@ -6,8 +6,16 @@ from typing import ClassVar
 
 import numpy as np
 
+from glotouch_bt.motion import Motion
+from glotouch_bt.robot import Observation
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import MIN_GRIP_M, feel_hold
+from glotouch_skills.common.hand import MIN_GRIP_M, feel_hold, release, rise_clear
+from glotouch_skills.common.planning import GraspPlan
+
+OPEN_BY_M = 0.02
+"""Opening of the jaws that let go, beyond the held width: 10 mm on each side, as at a closure."""
+LOWER_M_S = 0.02
+"""Speed back down with an object that was held back."""
 
 
 class LiftParams(SkillParams):
@@ -15,6 +23,9 @@ class LiftParams(SkillParams):
 
     height_m: float = param("Height of the lift", unit="m", default=0.15, gt=0.0, le=0.3)
     speed_m_s: float = param("Lifting speed", unit="m/s", default=0.06, gt=0.0, le=0.2)
+    max_N: float = param(
+        "Largest force on the hand as it rises, the object's weight included", unit="N", default=12.0, gt=0.0, le=25.0
+    )
     min_weight_N: float = param("Least weight of a lifted object", unit="N", default=0.3, ge=0.0)
     min_aperture_m: float = param("Minimum aperture of jaws that hold something", unit="m", default=MIN_GRIP_M, ge=0.0)
     slip_m: float = param(
@@ -24,10 +35,11 @@ class LiftParams(SkillParams):
 
 
 class Lift(Skill):
-    """Raise the hand and check the hold at the top: by weight, by the jaws (aperture and force), and by the gels.
+    """Raise the hand under a force limit and check the hold at the top: by weight, jaws (aperture and force), and gels.
 
     No single witness is believed: a wrist may be off zero, and jaws may report what they were told. All must agree.
     Jaws that closed farther, with the object on both gels, hold one that turned between them: `grip_m` is written anew.
+    An object that holds the hand back is lowered again and let go.
 
     SUCCESS: an object with weight hangs in the jaws, and the arm holds it up.
     """
@@ -45,19 +57,55 @@ class Lift(Skill):
         "not all of weight, jaws and gels show the object at the top",
         advice="grasp nearer to the centre of mass, or harder",
     )
+    STUCK = Failure(
+        "stuck",
+        "something holds the hand back as it rises; the jaws have let go, and the hand is above the objects",
+        advice="the object is jammed between others or under one, or the jaws hold more than it; for a heavy one, "
+        "raise max_N",
+    )
     FAILURES: ClassVar = (MOTION_REFUSED.with_meaning("the arm cannot be raised so far"),)
 
     grip_m = In(float, "aperture of the closed jaws")
+    made = In(GraspPlan, "how it was taken", required=False, expected=False)
+    doubtful_before = In(
+        tuple, "indices of candidates on which closures met something", key="doubtful", element=int, required=False,
+        expected=False,
+    )  # fmt: skip
+    graspable = Out(bool, "false: something holds the hand back; more may be in the jaws than was traced", always=True)
+    doubtful = Out(tuple, "the same, with the object that holds the hand back", element=int, always=True)
     held_m = Out(float, "aperture at the top", key="grip_m")
     weight_N = Out(float, "weight in the hand, N", key="weight", result=lambda w: f"weight in the hand {w:.2f} N")
 
     def run(self) -> SkillRun:
         """See the class."""
         arm, p = self.context.arm, self.params
-        yield from arm.shift(np.array([0.0, 0.0, p.height_m]), p.speed_m_s, check=False)
+        self.graspable, self.doubtful = True, self.doubtful_before or ()
+        risen = yield from arm.shift(np.array([0.0, 0.0, p.height_m]), p.speed_m_s, check=False, guard=self._held_back)
+        if isinstance(risen.stop, float):
+            yield from self._let_go(risen.travelled_m)
+            self.graspable = False
+            if self.made is not None:
+                self.doubtful = tuple(sorted({*self.doubtful, self.made.candidate}))
+            raise self.STUCK(
+                f"{risen.stop:.1f} N on the hand after {risen.travelled_m * 1e3:.0f} mm, {p.max_N:.1f} N are allowed",
+                force_N=risen.stop,
+                limit_N=p.max_N,
+            )
         hold = yield from feel_hold(arm, self.grip_m, p.look_s)
         self.event("lift", **hold.as_dict())
         doubts = hold.doubts(p.min_weight_N, p.slip_m, p.min_aperture_m, may_turn=True)
         if doubts:
             raise self.LOST("; ".join(doubts), **hold.as_dict())
         self.held_m, self.weight_N = hold.aperture_m, hold.weight_N
+
+    def _held_back(self, seen: Observation) -> float | None:
+        """Return the period's mean force, N, if it passes the limit (a `motion.Guard`)."""
+        force_N = float(np.linalg.norm(seen.wrench_S[:, :3].mean(axis=0)))
+        return None if force_N <= self.params.max_N else force_N
+
+    def _let_go(self, risen_m: float) -> Motion[None]:
+        """Lower the object to where it was taken, open the jaws, and rise without it."""
+        arm = self.context.arm
+        yield from arm.shift(np.array([0.0, 0.0, -risen_m]), LOWER_M_S, check=False, what="lower again")
+        yield from release(arm, min(max(arm.aperture_m, 0.0) + OPEN_BY_M, arm.description.gripper.stroke_m))
+        yield from rise_clear(arm)

@@ -9,6 +9,7 @@ import pytest
 from py_trees.common import Status
 
 from glotouch_bt.robot import TactileFrame
+from glotouch_skills.common.planning import GraspPlan
 from glotouch_skills.take.lift import Lift
 
 PRESSED = np.pad(np.full((15, 10), 4e-4), ((10, 10), (5, 5)))
@@ -17,7 +18,7 @@ FLAT = np.zeros_like(PRESSED)
 
 @pytest.fixture
 def make(bench):
-    def make_one(weight_N=2.5, grip_width_m=0.04, gel_m=PRESSED, jaws=None, **params):
+    def make_one(weight_N=2.5, grip_width_m=0.04, gel_m=PRESSED, jaws=None, inputs=None, **params):
         start = {}
 
         def weight(position, aperture):
@@ -36,7 +37,7 @@ def make(bench):
             return dataclasses.replace(seen, gripper=dataclasses.replace(seen.gripper, **(jaws or {})))
 
         b.robot.cycle = reported
-        return b, b.make(Lift, inputs={"grip_m": 0.04}, **params)
+        return b, b.make(Lift, inputs={"grip_m": 0.04} | (inputs or {}), **params)
 
     return make_one
 
@@ -68,6 +69,34 @@ def test_lift__lost_if_any_witness_says_so(make, against) -> None:
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "lost")
     assert set(skill.reason.evidence) == {"weight_N", "aperture_m", "moved_m", "jaw_N", "gels_touched"}
+
+
+def test_an_object_that_holds_the_hand_back_is_let_go(make) -> None:
+    made = GraspPlan(3, np.zeros(3), 0.0, 0.04, 0.06)
+    b, skill = make(weight_N=14.0, inputs={"made": made, "doubtful_before": (1,)})
+    z, cycle, before_it_opened = float(b.arm.pose_B_P.position_m[2]), b.robot.cycle, []
+
+    def watched(command):
+        seen = cycle(command)
+        if seen.gripper.aperture_m < 0.0405:
+            before_it_opened.append(float(seen.position_B_P[-1][2]))
+        return seen
+
+    b.robot.cycle = watched
+    b.run(skill)
+    assert (skill.status, skill.reason.code) == (Status.FAILURE, "stuck")
+    assert skill.reason.evidence == {"force_N": pytest.approx(14.0), "limit_N": 12.0}
+    assert max(before_it_opened) < z + 0.02, "it stops at once"
+    assert before_it_opened[-1] == pytest.approx(z, abs=1e-3), "it lets go where the object was taken"
+    assert (skill.graspable, skill.doubtful) == (False, (1, 3)), "it is traced anew"
+    assert b.arm.aperture_m == pytest.approx(0.06, abs=1e-3)
+    assert float(b.arm.pose_B_P.position_m[2]) > z + 0.05
+
+
+def test_a_heavy_object_needs_a_higher_limit(make) -> None:
+    b, skill = make(weight_N=14.0, max_N=20.0)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
 
 
 def test_an_object_that_turned_between_the_jaws_is_held(make) -> None:
