@@ -38,7 +38,8 @@ class NextProbe(Skill):
     the target's STL excludes already is not measured. One that is probably not needed is put off, but only until the
     jaws have been used. Without a target all are measured, the least certain outline first.
 
-    Two candidates that are one body become one in `candidates`: they overlap, or they are parts of the target.
+    Two candidates that are one body become one in `candidates`: they overlap, or they are parts of the target. One
+    without a top is left out: the object was moved, and another candidate was traced where it stands, or will be.
 
     SUCCESS: `candidate` and `next_part` are chosen, or `measured_enough` is true and `next_part` is empty.
     """
@@ -54,6 +55,7 @@ class NextProbe(Skill):
     known = In(tuple, "all candidates", key="candidates", element=Candidate, required=False)
     measured = In(Candidate, "the candidate measured last", key="candidate", required=False)
     chosen = In(str, "what was measured last; nothing yet", key="next_part", required=False)
+    gone = In(bool, "nothing stands where the last one was traced", required=False, expected=False)
     felt = In(tuple, "closures so far", element=TouchSet, required=False, expected=False)
     before = In(tuple, "measurements tried so far", key="probed", element=ProbeTouch, required=False)
     candidates = Out(tuple, "all candidates, with what was measured last", element=Candidate)
@@ -71,6 +73,9 @@ class NextProbe(Skill):
         yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
         new, before = self.measured if self.chosen else None, self.before or ()
         candidates = tuple(new if new is not None and new.index == c.index else c for c in self.known)
+        if new is not None and self.gone and self.chosen == "top" and len(candidates) > 1:
+            candidates = tuple(c for c in candidates if c.index != new.index)
+            self.event("note", text=f"candidate {new.index} is left out: nothing stands where it was traced")
         model = self._target()
         candidates = self._distinct(candidates, model)
         tried = {(t.candidate, t.part) for t in before}

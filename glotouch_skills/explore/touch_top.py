@@ -71,17 +71,19 @@ class TouchTop(Skill):
     candidate = In(Candidate, "the object, as traced")
     measured = Out(Candidate, "the same with its height", always=True)
     height_m = Out(float, "height of its top above the floor, m")
+    gone = Out(bool, "nothing stands where it was traced", always=True)
 
     def run(self) -> SkillRun:
         """See the class."""
         candidate, tool = self.candidate, self.tool
         touched_m = float(np.median([c.tip_K_m[2] for c in candidate.contacts])) - tool.floor_z_K_m
-        self.measured = replace(candidate, height_m=max(candidate.height_m, touched_m))
+        self.measured, self.gone = replace(candidate, height_m=max(candidate.height_m, touched_m)), False
         prober = Prober(self.context, tool, GuardParams())
         # A low object met the lower half of the ball.
         sides_m = touched_m - (tool.tip_radius_m if tool.round else 0.0)
         top = yield from drive(self._plan(candidate, sides_m), partial(self._make, prober))
         if top.ball_K_m is None:
+            self.gone = True
             raise self.NO_TOP(
                 f"nothing higher than {sides_m * 1e3:.0f} mm was met where candidate {candidate.index} was traced",
                 sides_m=sides_m,

@@ -88,6 +88,14 @@ def test_what_was_measured_last_replaces_what_was_known(asked, things) -> None:
     assert (skill.candidate, skill.next_part) == (new, "top")
 
 
+@pytest.mark.parametrize(("chosen", "kept"), [("top", [0, 2]), ("outline", [0, 1, 2])])
+def test_what_is_gone_is_no_candidate_any_more(asked, things, chosen: str, kept: list[int]) -> None:
+    skill = asked(things, measured=things[1], chosen=chosen, gone=True, before=(ProbeTouch(1, chosen),))
+    assert [c.index for c in skill.candidates] == kept
+    alone = asked(things[1:2], measured=things[1], chosen=chosen, gone=True, before=(ProbeTouch(1, chosen),))
+    assert alone.candidates == things[1:2], "one is kept: without any there would be nothing to trace anew"
+
+
 def test_begun_anew_it_keeps_what_was_found_since(asked, things) -> None:
     """`candidate` is still the one that was measured last, the search has gone on meanwhile."""
     made = tuple(ProbeTouch(i, part) for i in (1, 2, 0) for part in ("outline", "top"))

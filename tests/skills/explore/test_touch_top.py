@@ -17,6 +17,8 @@ from glotouch_bt.robot import MotionRefused
 from glotouch_skills.explore.touch_top import TouchTop
 
 BALL, CEILING, LOWEST = 0.006, 0.136, 0.024
+FINEST_M = 2e-5
+"""A graze that is less deep may fall between two of the 400 places at which `play` looks for a touch."""
 Height = Callable[[np.ndarray], np.ndarray]  # (n, 2) -> (n,) ball's centre when it touches the object from above there
 
 
@@ -93,7 +95,7 @@ def test_a_chimney_on_a_deck_is_found_if_any_pass_can_meet_it(
     points, chimney = outline(0.050, 0.022), box(x, y, half_x, half_y, 0.04 + rise)
     top, _ = play(plan_over(points), together(box(0, 0, 0.050, 0.022, 0.04), chimney))
     error = 0.04 + rise + BALL - top.ball_K_m[2]
-    found = -1e-9 <= error <= TopRule().clearance_m + 1e-9
+    found = -1e-9 <= error <= TopRule().clearance_m + FINEST_M
     assert found or not _is_met(chimney, points, 0.04 + BALL + TopRule().clearance_m)
 
 
@@ -211,6 +213,7 @@ def test_a_chimney_at_the_edge_of_a_narrow_post(make, things) -> None:
     b, skill = make([things.post(POST, 0.020, TOP), things.post(chimney, 0.002, TOP + 0.02)], radius=0.020)
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
+    assert not skill.gone
     assert skill.measured.height_m == pytest.approx(TOP + 0.02, abs=1e-3)
 
 
@@ -219,6 +222,7 @@ def test_touch_top__no_top(make) -> None:
     b, skill = make([])
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "no_top")
+    assert skill.gone
     assert skill.measured.height_m == pytest.approx(0.02)
     assert skill.measured.index == skill.candidate.index
 
