@@ -10,6 +10,8 @@ import pytest
 import trimesh
 from py_trees.common import Status
 
+from glotouch_bt.perception import recognition
+from glotouch_bt.perception.recognition import Ranking
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene.meshes import load_mesh
 from glotouch_skills.common.planning.target import load_target
@@ -43,10 +45,11 @@ def touchsets(folder, found):
 
 @pytest.fixture
 def make(bench, folder):
-    def make_one(target, touchsets):
+    def make_one(target, touchsets, **inputs):
         b = bench()
         b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
-        return b, b.make(MatchTarget, inputs={} if touchsets is None else {"touchsets": touchsets}, target=target)
+        inputs |= {} if touchsets is None else {"touchsets": touchsets}
+        return b, b.make(MatchTarget, inputs=inputs, target=target)
 
     return make_one
 
@@ -77,6 +80,30 @@ def test_match__not_recognised(make, touchsets) -> None:
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "not_recognised")
     assert len(skill.ranking.matches) == 2
     assert skill.reason.message.startswith("no candidate is surely block: ")
+
+
+@pytest.mark.parametrize(
+    ("postponed", "rival", "accepted"), [(1, 0.09, False), (0, 0.09, True), (None, 0.09, True), (1, 0.02, True)]
+)
+def test_what_was_put_off_may_be_the_target_instead(
+    make, touchsets, monkeypatch: pytest.MonkeyPatch, postponed: int | None, rival: float, accepted: bool
+) -> None:
+    matcher = recognition.MATCHERS["likelihood"]
+
+    def doubting(*args: object) -> Ranking:
+        ranking = matcher(*args)
+        assert ranking.accepted
+        first, second = ranking.matches
+        matches = replace(first, probability=0.98 - rival), replace(second, probability=rival)
+        return replace(ranking, matches=matches)
+
+    monkeypatch.setattr(recognition, "MATCHERS", {"likelihood": doubting})
+    b, skill = make("block", touchsets, **({} if postponed is None else {"postponed": postponed}))
+    b.run(skill)
+    assert (skill.status is Status.SUCCESS) == accepted, skill.feedback_message
+    assert skill.ranking.accepted == accepted
+    if not accepted:
+        assert "with probability 0.09, and 1 were put off" in skill.reason.message
 
 
 def test_an_identical_object_is_named(make, touchsets, folder, tmp_path) -> None:
