@@ -85,8 +85,8 @@ def test_an_object_that_holds_the_hand_back_is_let_go(make) -> None:
     b.robot.cycle = watched
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "stuck")
-    assert skill.reason.evidence == {"force_N": pytest.approx(14.0), "limit_N": 12.0}
-    assert max(before_it_opened) < z + 0.02, "it stops at once"
+    assert skill.reason.evidence == {"force_N": pytest.approx(14.0, rel=0.01), "limit_N": 12.0}
+    assert max(before_it_opened) < z + 0.008, "it stops at once: the weight begins at 5 mm"
     assert before_it_opened[-1] == pytest.approx(z, abs=1e-3), "it lets go where the object was taken"
     assert (skill.graspable, skill.doubtful) == (False, (1, 3)), "it is traced anew"
     assert b.arm.aperture_m == pytest.approx(0.06, abs=1e-3)
