@@ -159,7 +159,7 @@ ONE: Any = {"places": {"block": (0.02, 0.05, 0.0)}, "sizes": {"block": WIDE}}
 
 def test_what_fell_while_it_was_lifted_is_grasped_again(run: Run) -> None:
     stubs = {"sure": planned(upright(0, 0.02, 0.05, 0.040))}
-    done = run(HOLD_IT, "  - {fault: grip_drop, when: {node: lift, after_s: 0.4}, for: 1 s}", stubs=stubs, **ONE)
+    done = run(HOLD_IT, "  - {fault: grip_drop, when: {node: lift, after_s: 1.0}, for: 1 s}", stubs=stubs, **ONE)
     assert done.outcome.status == "success", done.outcome.reasons
     assert done.held == ["block"]
     assert done.notes.how_often("grasp", "SUCCESS") == 2
