@@ -16,7 +16,7 @@ from glotouch_skills.common.planning import TOO_LOW, GraspPlan, SoughtObject, fi
 
 MAX_RIVAL = 0.05
 """Probability that another candidate is the target from which those that were put off are measured first. Source: ours;
-a truck was taken for another object with 0.89 while the true one, with 0.09, had been put off (`bench retrieve --world
+another object was taken for the truck with 0.89 while the truck, with 0.09, had been put off (`bench retrieve --world
 touching_five --conditions realistic`, seed 59642, c7043584)."""
 
 
@@ -114,7 +114,7 @@ class MatchTarget(Skill):
         rivals = sum(m.probability for m in ranking.matches if m.index != ranking.best.index)
         if not (ranking.accepted and self.postponed and rivals >= MAX_RIVAL):  # without probabilities they are NaN
             return ranking
-        why = f"another candidate is the target with probability {rivals:.2f}, and {self.postponed} were put off"
+        why = f"another candidate is the target with probability {rivals:.2f}; not yet measured: {self.postponed}"
         return replace(ranking, accepted=False, reasons=(*ranking.reasons, why))
 
     def _told_of_twins(self, ranking: Ranking, target: SoughtObject) -> Ranking:

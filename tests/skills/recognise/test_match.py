@@ -103,7 +103,7 @@ def test_what_was_put_off_may_be_the_target_instead(
     assert (skill.status is Status.SUCCESS) == accepted, skill.feedback_message
     assert skill.ranking.accepted == accepted
     if not accepted:
-        assert "with probability 0.09, and 1 were put off" in skill.reason.message
+        assert "with probability 0.09; not yet measured: 1" in skill.reason.message
 
 
 def test_an_identical_object_is_named(make, touchsets, folder, tmp_path) -> None:
