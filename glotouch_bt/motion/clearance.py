@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,12 +21,12 @@ from glotouch_bt.motion.shapes import (
     MovingPart,
     Obstacle,
     arm_parts,
-    make_obstacle,
+    prism,
     stowed_probe,
     tool_parts,
     world_obstacles,
 )
-from glotouch_bt.robot import Array, ParamError, Pose, UnknownName, World
+from glotouch_bt.robot import Array, ParamError, UnknownName, World
 
 if TYPE_CHECKING:
     import fcl
@@ -127,54 +127,27 @@ class Scene:
             self._obstacles[self._probe.name] = self._probe
 
     def add_obstacle(
-        self,
-        name: str,
-        kind: Literal["round", "box"],
-        *,
-        centre_K_m: npt.ArrayLike,
-        size_m: tuple[float, float],
-        height_m: float,
-        yaw_rad: float = 0.0,
-        base_K_m: float = 0.0,
-    ) -> None:
-        """Add or replace an upright box or cylinder in the container.
+        self, name: str, outline_K_m: npt.ArrayLike, *, height_m: float, base_K_m: float = 0.0
+    ) -> None:  # fmt: skip
+        """Add or replace an upright prism over the convex hull of an outline in the container.
 
         Args:
             name: Any name but a built-in obstacle's.
-            kind: "round" (a cylinder of diameter size_m[0]) or "box".
-            centre_K_m: (2,) its axis in K.
-            size_m: (along yaw, across), m.
+            outline_K_m: (n, 2) points on its outline in K, in any order.
             height_m: Its top above its base.
-            yaw_rad: Direction of its first side in K.
             base_K_m: Height of its base above the container floor.
 
         Raises:
-            ParamError: A built-in name, an unknown kind, or sizes that are not positive and finite.
+            ParamError: A built-in name, an outline without an area, or a height that is not positive and finite.
         """
         if name in OWN_OBSTACLES:
             raise ParamError("obstacle", name, "not the name of a built-in obstacle")
-        if kind not in ("round", "box"):
-            raise ParamError("obstacle.kind", kind, "'round' or 'box'")
-        centre = np.asarray(centre_K_m, dtype=np.float64)
-        sizes = np.array([*size_m, height_m])
-        if centre.shape != (2,) or not (np.isfinite(centre).all() and np.isfinite(sizes).all() and (sizes > 0).all()):
-            raise ParamError(f"obstacle {name}", (centre_K_m, size_m, height_m), "a centre (2,) and positive sizes")
-        pose_K = Pose.planar((*centre, base_K_m + 0.5 * height_m), yaw_rad)
-        pose = self._world.container.pose_B_K @ pose_K
-        if kind == "round":
-            sizes[1] = sizes[0]
-            shape = fcl.Cylinder(0.5 * sizes[0], height_m)
-        else:
-            shape = fcl.Box(*sizes)
-        self._obstacles[name] = make_obstacle(name, pose, 0.5 * sizes, shape)
-        self._added[name] = {
-            "kind": kind,
-            "centre_K_m": centre,
-            "size_m": size_m,
-            "height_m": height_m,
-            "yaw_rad": yaw_rad,
-            "base_K_m": base_K_m,
-        }
+        outline = np.array(outline_K_m, dtype=np.float64)
+        if not (0.0 < height_m < np.inf):
+            raise ParamError(f"obstacle {name}", height_m, "a positive height")
+        pose_B_K = self._world.container.pose_B_K
+        self._obstacles[name] = prism(name, pose_B_K, outline, base_K_m, height_m)
+        self._added[name] = {"outline_K_m": outline, "height_m": height_m, "base_K_m": base_K_m}
 
     def remove_obstacle(self, name: str) -> None:
         """Remove an added obstacle and its allowed contacts.

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from glotouch_bt.lazy import lazy_module
-from glotouch_bt.robot import Array, Gripper, Pose, Probe, RobotDescription, World
+from glotouch_bt.robot import Array, Gripper, ParamError, Pose, Probe, RobotDescription, World
 
 if TYPE_CHECKING:
     import fcl
@@ -88,6 +89,32 @@ def make_obstacle(name: str, pose: Pose, half_m: Array, shape: fcl.CollisionGeom
     """Return a fixed shape at a pose in B; `half_m` (3,) are the half sizes of its box in its own frame."""
     body = fcl.CollisionObject(shape, fcl.Transform(np.array(pose.rotation), np.array(pose.position_m)))
     return Obstacle(name, np.array(pose.position_m), np.abs(pose.rotation) @ half_m, body)
+
+
+def prism(name: str, pose_B_K: Pose, outline_K_m: Array, base_K_m: float, height_m: float) -> Obstacle:
+    """Return the upright prism over the convex hull of an outline.
+
+    Args:
+        name: Name of the obstacle.
+        pose_B_K: Pose of the container.
+        outline_K_m: (n, 2) points in K.
+        base_K_m: Height of its base above the container floor.
+        height_m: Its top above its base.
+
+    Raises:
+        ParamError: The outline has no area.
+    """
+    try:
+        corners = outline_K_m[scipy.spatial.ConvexHull(outline_K_m).vertices]  # counter-clockwise
+    except (ValueError, scipy.spatial.QhullError):
+        raise ParamError(f"obstacle {name}", np.shape(outline_K_m), "an outline (n, 2) that spans an area") from None
+    middle, half = 0.5 * (corners.max(axis=0) + corners.min(axis=0)), 0.5 * np.ptp(corners, axis=0)
+    n, z = len(corners), np.full((len(corners), 1), 0.5 * height_m)
+    vertices = np.concatenate([np.hstack([corners - middle, -z]), np.hstack([corners - middle, z])])
+    sides = [[4, i, (i + 1) % n, n + (i + 1) % n, n + i] for i in range(n)]
+    faces = np.concatenate([[n, *range(n - 1, -1, -1)], [n, *range(n, 2 * n)], *sides])
+    pose = pose_B_K @ Pose(np.array([*middle, base_K_m + 0.5 * height_m]))
+    return make_obstacle(name, pose, np.array([*half, 0.5 * height_m]), fcl.Convex(vertices, n + 2, faces))
 
 
 def world_obstacles(world: World) -> list[Obstacle]:

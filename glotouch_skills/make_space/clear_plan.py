@@ -9,9 +9,10 @@ import numpy as np
 from glotouch_bt.motion import Motion
 from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.perception.touch import Candidate
+from glotouch_bt.perception.touch.outline import convex_hull
 from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.planning import Clearing, ClearPlanner, FreePlace, GraspPlan, Neighbour, sampled
+from glotouch_skills.common.planning import Clearing, ClearPlanner, FreePlace, GraspPlan, Neighbour
 
 
 class ClearPlanParams(SkillParams):
@@ -93,4 +94,4 @@ class ClearPlan(Skill):
 def obstacles(belief: SearchMap | None) -> tuple[Neighbour, ...]:
     """Return what the search met and did not trace as an object: nothing is set down there."""
     untraced = [e.contour for e in belief.exclusions if not e.traced] if belief else []
-    return tuple(Neighbour(-1, contour, sampled(contour.outline_K_m(90))) for contour in untraced)
+    return tuple(Neighbour.within(-1, convex_hull(contour.outline_K_m(90))) for contour in untraced)

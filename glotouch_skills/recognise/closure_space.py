@@ -9,10 +9,19 @@ import numpy as np
 
 from glotouch_bt.motion import hand_pose_B
 from glotouch_bt.perception import recognition
+from glotouch_bt.perception.touch.outline import footprint
 from glotouch_bt.robot import MotionRefused
 from glotouch_bt.skill import Context
 from glotouch_skills.common.hand import CLEARANCE_M, NoSpace, keeping_clear_of, neighbours, require_clear
-from glotouch_skills.common.planning import ClosureParams, Option, Stance, beside, side_gaps_m
+from glotouch_skills.common.planning import (
+    ClosureParams,
+    Neighbour,
+    Option,
+    Stance,
+    beside,
+    finger_clearance_m,
+    side_gaps_m,
+)
 
 if TYPE_CHECKING:
     from glotouch_bt.perception.recognition import Belief
@@ -37,10 +46,15 @@ def fitting_stance(context: Context, belief: Belief, option: Option, side_gap_m:
     arm, closure = context.arm, option.closure
     gripper, gaps_m = arm.description.gripper, side_gaps_m(side_gap_m)
     (touchset,) = (t for t in belief.touchsets if t.candidate.index == closure.candidate)
-    opened = (option.at.opened(gap, gripper) for gap in gaps_m)
-    refusals = []
-    with keeping_clear_of(arm, neighbours((t.candidate for t in belief.touchsets), closure.candidate)):
+    opened = [option.at.opened(gap, gripper) for gap in gaps_m]
+    near = neighbours((t.candidate for t in belief.touchsets), closure.candidate)
+    around = [Neighbour.within(c.index, footprint(c, presumed=False)) for c in near]
+    half_extent_m = 0.5 * np.array(context.world.container.interior_m[:2])
+    refusals: list[MotionRefused] = []
+    with keeping_clear_of(arm, near):
         for at in (*opened, *beside(touchset, option.at, gripper, gaps_m[-1])):
+            if refusals and finger_clearance_m(at, around, half_extent_m, gripper) < CLEARANCE_M:
+                continue  # much quicker than the whole hand at its place, which gives the first refusal
             place = np.array([*at.position_K_m, closure.height_m])
             pose = hand_pose_B(arm, context.world.container, place, at.yaw_K_rad)
             try:

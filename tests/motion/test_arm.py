@@ -13,6 +13,7 @@ from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.motion import Arc, Arm, Line, Polyline
 from glotouch_bt.robot import Limits, MotionRefused, Observation, Pose, World
 from glotouch_bt.robot.fake import FAKE_ARM, FakeRobot, SpringWall
+from tests.support.outlines import disc
 
 DT = 0.01
 
@@ -161,7 +162,7 @@ def test_collision_is_refused_by_name_before_any_command(arm: Arm, robot: FakeRo
         drive(robot, arm.shift((0.0, 0.25, 0.0), 0.1))
     with pytest.raises(MotionRefused, match=r"finger would hit floor of the container"):
         drive(robot, arm.shift((0.0, 0.0, -0.06), 0.1))
-    arm.scene.add_obstacle("pillar", "round", centre_K_m=(0.0, 0.1), size_m=(0.03, 0.03), height_m=0.07)
+    arm.scene.add_obstacle("pillar", disc((0.0, 0.1), 0.03), height_m=0.07)
     with pytest.raises(MotionRefused, match=r"would hit pillar"):
         drive(robot, arm.shift((0.0, 0.1, 0.0), 0.1))
     assert robot.cycles == before

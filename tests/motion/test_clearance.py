@@ -8,6 +8,7 @@ import pytest
 
 from glotouch_bt.motion import Kinematics, Scene
 from glotouch_bt.robot import ParamError, Pose, UnknownName, World
+from tests.support.outlines import disc, rectangle
 
 FLOOR_B = -0.2
 TIP_BELOW_P, TIP_RADIUS = 0.130, 0.006
@@ -58,7 +59,7 @@ def test_fingers_to_walls_closed_form(scene: Scene, kinematics: Kinematics, aper
 
 def test_links_are_where_the_description_says(scene: Scene, kinematics: Kinematics) -> None:
     """A link capsule's distance from a pillar beside the arm, by hand: point to segment."""
-    scene.add_obstacle("ball-like", "round", centre_K_m=(-0.3, 0.3), size_m=(0.02, 0.02), height_m=0.5)
+    scene.add_obstacle("ball-like", disc((-0.3, 0.3), 0.02), height_m=0.5)
     q = kinematics.home
     rotations, origins = kinematics.link_placements(q)
     for i, joint in enumerate(kinematics.description.joints[3:6], start=3):
@@ -91,7 +92,7 @@ def test_gripper_body_above_a_wall_is_checked(scene: Scene, kinematics: Kinemati
 def test_broad_phase_keeps_every_near_pair(scene: Scene, kinematics: Kinematics) -> None:
     """Random postures: `violations` has exactly the pairs whose single distances are below the margin."""
     scene.hold_tool(True)
-    scene.add_obstacle("block", "box", centre_K_m=(0.05, 0.1), size_m=(0.06, 0.03), height_m=0.07, yaw_rad=0.6)
+    scene.add_obstacle("block", rectangle((0.05, 0.1), (0.06, 0.03), 0.6), height_m=0.07)
     rng = np.random.default_rng(3)
     blocked = 0
     for _ in range(60):
@@ -105,19 +106,19 @@ def test_broad_phase_keeps_every_near_pair(scene: Scene, kinematics: Kinematics)
 
 def test_obstacles_are_added_and_removed(scene: Scene, kinematics: Kinematics) -> None:
     q = at(kinematics, 0.0, 0.0, 0.05)
-    scene.add_obstacle("can", "round", centre_K_m=(0.0, 0.05), size_m=(0.06, 0.06), height_m=0.06)
+    scene.add_obstacle("can", disc((0.0, 0.05), 0.06), height_m=0.06)
     assert distance_m(scene, "left finger", "can", q, 0.0) == pytest.approx(0.05 - 0.03 - 0.014, abs=2e-5)
     assert "can" in str(first(scene, q, 0.085))
     scene.remove_obstacle("can")
     assert first(scene, q, 0.085) is None
-    scene.add_obstacle("a", "box", centre_K_m=(0.0, 0.0), size_m=(0.02, 0.02), height_m=0.04)
+    scene.add_obstacle("a", rectangle((0.0, 0.0), (0.02, 0.02)), height_m=0.04)
     scene.clear_obstacles()
     assert "a" not in scene.obstacles
 
 
 def test_allow_applies_to_one_pair_only(scene: Scene, kinematics: Kinematics) -> None:
     scene.hold_tool(True)
-    scene.add_obstacle("can", "round", centre_K_m=(0.0, 0.0), size_m=(0.05, 0.05), height_m=0.06)
+    scene.add_obstacle("can", disc((0.0, 0.0), 0.05), height_m=0.06)
     q = at(kinematics, 0.03, 0.0, 0.02 + TIP_BELOW_P)
     assert str(first(scene, q, 0.016)).startswith("tip would hit can")
     scene.allow("tip", "can")
@@ -158,6 +159,8 @@ def test_invalid_names_and_sizes_are_refused(scene: Scene) -> None:
     with pytest.raises(UnknownName):
         scene.remove_obstacle("floor")
     with pytest.raises(ParamError):
-        scene.add_obstacle("floor", "box", centre_K_m=(0, 0), size_m=(0.1, 0.1), height_m=0.1)
+        scene.add_obstacle("floor", rectangle((0, 0), (0.1, 0.1)), height_m=0.1)
     with pytest.raises(ParamError):
-        scene.add_obstacle("x", "box", centre_K_m=(0, 0), size_m=(0.1, -0.1), height_m=0.1)
+        scene.add_obstacle("x", [(0, 0), (0.1, 0.1), (0.05, 0.05)], height_m=0.1)
+    with pytest.raises(ParamError):
+        scene.add_obstacle("x", rectangle((0, 0), (0.1, 0.1)), height_m=0.0)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.perception.search.bodies import KNOWN_QUALITY, SEPARATE_NATS, outline_of
+from glotouch_bt.perception.search.bodies import SEPARATE_NATS, outline_of
 from glotouch_bt.perception.search.map import FACING
 from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams
 from glotouch_bt.perception.touch import Candidate, Contact, contour_quality, signed_distance
-from glotouch_bt.perception.touch.outline import convex_hull, envelope, polygon_distance
+from glotouch_bt.perception.touch.outline import KNOWN_QUALITY, convex_hull, envelope, polygon_distance
 from glotouch_bt.robot import Array
 
 SAME_M = 0.010

@@ -19,6 +19,7 @@ from glotouch_bt.perception.search.map import Mask
 from glotouch_bt.perception.search.tracing import TraceParams
 from glotouch_bt.perception.touch import Candidate, Contact, signed_distance
 from glotouch_bt.perception.touch.outline import (
+    KNOWN_QUALITY,
     OutlineBelief,
     convex_hull,
     envelope,
@@ -48,9 +49,6 @@ ONE_BODY = {"intercept": -1.7, "per_nat": -0.02, "same_body": 1.5, "uncertain": 
 """Log odds that two neighbouring candidates are one body: the intercept, and what each nat of gain, centres inside each
 other's envelope (`same_body`) and an uncertain candidate add. Source: logistic regression on 116 pairs, of which 23
 were one body (planar, seeds 61200-61220 of touching_five and 61200-61211 of close_five)."""
-KNOWN_QUALITY = 0.3
-"""Minimum quality of a candidate beside another one that counts without doubt: the centre's standard deviation is below
-8 mm. Source: ours."""
 BESIDE_M = 0.020
 """Maximum distance between outlines that may be one body."""
 MAX_NATS = 7.0

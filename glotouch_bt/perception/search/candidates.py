@@ -10,7 +10,6 @@ import numpy as np
 
 from glotouch_bt.perception.search.belonging import MAX_LENGTH_M, is_fully_traced, is_over, overlaps
 from glotouch_bt.perception.search.bodies import (
-    KNOWN_QUALITY,
     SEPARATE_NATS,
     Doubt,
     bodies,
@@ -32,6 +31,7 @@ from glotouch_bt.perception.touch import (
     split_at_motion,
 )
 from glotouch_bt.perception.touch.outline import (
+    KNOWN_QUALITY,
     OutlineBelief,
     area_and_centroid,
     convex_hull,

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 from glotouch_bt.motion import Arm
 from glotouch_bt.perception.touch import Candidate, signed_distance
-from glotouch_bt.perception.touch.outline import envelope
+from glotouch_bt.perception.touch.outline import envelope, footprint
 
 MIN_HEIGHT_M = 0.01
 """Least height of an obstacle, whatever height was touched."""
@@ -50,20 +50,17 @@ def _overlap(one: Candidate, other: Candidate) -> bool:
 
 @contextmanager
 def keeping_clear_of(arm: Arm, candidates: Iterable[Candidate]) -> Iterator[None]:
-    """Keep every motion inside the block clear of traced candidates."""
+    """Keep every motion inside the block clear of traced candidates.
+
+    Of one whose outline is uncertain, only what was met counts: what is only presumed would keep the hand off objects
+    that it can reach, and the hand moves guarded beside objects.
+    """
     names: list[str] = []
     try:
         for candidate in candidates:
-            hull = envelope(candidate)
             names.append(f"candidate {candidate.index}")
-            arm.scene.add_obstacle(
-                names[-1],
-                hull.kind,
-                centre_K_m=hull.centre_K_m,
-                size_m=hull.size_m,
-                height_m=max(candidate.height_m, MIN_HEIGHT_M),
-                yaw_rad=hull.yaw_rad,
-            )
+            outline = footprint(candidate, presumed=False)
+            arm.scene.add_obstacle(names[-1], outline, height_m=max(candidate.height_m, MIN_HEIGHT_M))
         yield
     finally:
         for name in names:

@@ -3,6 +3,7 @@
 from glotouch_skills.common.planning.clear_plan import Clearing, ClearPlanner, FreePlace
 from glotouch_skills.common.planning.finger_space import (
     Neighbour,
+    finger_clearance_m,
     finger_space_m,
     gap_m,
     sampled,

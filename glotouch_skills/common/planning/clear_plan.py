@@ -1,6 +1,6 @@
 """Clear the space beside an object: which neighbour to take out, how to grasp it, and where to set it down.
 
-Planar, in K. A place is free if the neighbour's envelope keeps a gap from all other objects and from the walls, and if
+Planar, in K. A place is free if the neighbour's footprint keeps a gap from all other objects and from the walls, and if
 the open fingers that release it there are clear, too.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from glotouch_bt.perception.touch import Candidate, signed_distance
+from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Array, Gripper
 from glotouch_skills.common.hand import CLEARANCE_M
 from glotouch_skills.common.planning.finger_space import (
@@ -227,21 +227,17 @@ class ClearPlanner:
 
 
 def placed(one: Neighbour, place: FreePlace) -> Neighbour:
-    """Return the envelope of an object at a place."""
-    contour = one.contour
-    points = np.array([place.moved(p) for p in one.points_K_m])
-    yaw = contour.yaw_rad + (0.0 if contour.family == "circle" else place.turn_rad)
-    moved = replace(contour, centre_K_m=place.moved(contour.centre_K_m), yaw_rad=yaw)
-    return Neighbour(one.index, moved, points)
+    """Return the footprint of an object at a place."""
+    return Neighbour.within(one.index, np.array([place.moved(p) for p in one.corners_K_m]))
 
 
 def free_gap_m(
     one: Neighbour, shifts_K_m: Array, others: Sequence[Neighbour], half_extent_m: Array
 ) -> Array:  # fmt: skip
-    """Return the gap (n,) of an envelope from the nearest object or wall after each displacement (n, 2).
+    """Return the gap (n,) of a footprint from the nearest object or wall after each displacement (n, 2).
 
     Args:
-        one: The envelope: a circle or a rectangle.
+        one: The footprint.
         shifts_K_m: (n, 2).
         others: What stands there.
         half_extent_m: (2,) half of the container's interior.
@@ -249,8 +245,8 @@ def free_gap_m(
     points = one.points_K_m[None] + shifts_K_m[:, None]
     least = (half_extent_m - np.abs(points)).min(axis=(1, 2))
     for other in others:
-        there = signed_distance(other.contour, points.reshape(-1, 2)).reshape(points.shape[:2])
+        there = other.distance_m(points.reshape(-1, 2)).reshape(points.shape[:2])
         back = (other.points_K_m[None] - shifts_K_m[:, None]).reshape(-1, 2)
-        here = signed_distance(one.contour, back).reshape(len(shifts_K_m), -1)
+        here = one.distance_m(back).reshape(len(shifts_K_m), -1)
         least = np.minimum(least, np.minimum(there.min(axis=1), here.min(axis=1)))
     return np.asarray(least)

@@ -1,18 +1,18 @@
 """Space for the fingers: how far the open fingers beside an object stay from its neighbours and from the walls.
 
-Planar, in K. Neighbours count with their envelopes, as they do in the clearance scene.
+Planar, in K. Neighbours count with the convex hulls of their contacts and outlines.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from glotouch_bt.perception.touch import Candidate, Contour, signed_distance
-from glotouch_bt.perception.touch.outline import envelope
+from glotouch_bt.perception.touch import Candidate, polygon_distance
+from glotouch_bt.perception.touch.outline import footprint
 from glotouch_bt.robot import Array, Gripper
 from glotouch_skills.common.hand import CLEARANCE_M
 from glotouch_skills.common.planning.squeeze_plan import Stance, side_gaps_m
@@ -27,28 +27,35 @@ SIDE_GAP_M = 0.010
 
 @dataclass(frozen=True, eq=False)
 class Neighbour:
-    """The envelope of a candidate.
+    """The footprint of a candidate.
 
     Attributes:
         index: Index of the candidate.
-        contour: Its envelope: a circle or a rectangle.
+        corners_K_m: (m, 2) corners of its convex outline.
         points_K_m: (n, 2) points on it, at most `SAMPLE_M` apart.
     """
 
     index: int
-    contour: Contour
+    corners_K_m: Array
     points_K_m: Array
 
     @classmethod
     def of(cls, candidate: Candidate) -> Neighbour:
-        """Return the envelope of a candidate, sampled."""
-        hull = envelope(candidate)
-        return cls(candidate.index, hull, sampled(hull.outline_K_m(90)))
+        """Return the footprint of a candidate, sampled."""
+        return cls.within(candidate.index, footprint(candidate))
+
+    @classmethod
+    def within(cls, index: int, corners_K_m: Array) -> Neighbour:
+        """Return the same for a convex outline (m, 2)."""
+        return cls(index, corners_K_m, sampled(np.concatenate([corners_K_m, corners_K_m[:1]])))
+
+    def distance_m(self, points_K_m: Array) -> Array:
+        """Return the signed distances (n,) of points (n, 2), negative inside."""
+        return polygon_distance(self.corners_K_m, points_K_m)
 
     def moved(self, shift_K_m: Array) -> Neighbour:
         """Return the same, displaced by a vector (2,)."""
-        contour = replace(self.contour, centre_K_m=self.contour.centre_K_m + shift_K_m)
-        return Neighbour(self.index, contour, self.points_K_m + shift_K_m)
+        return Neighbour(self.index, self.corners_K_m + shift_K_m, self.points_K_m + shift_K_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,23 +111,23 @@ def clearance_m(rectangle: Rectangle, neighbours: Sequence[Neighbour], half_exte
     least = float((half_extent_m - np.abs(rectangle.corners_K_m)).min())
     for other in neighbours:
         least = min(least, float(rectangle.distance_m(other.points_K_m).min()))
-        inside = signed_distance(other.contour, rectangle.centre_K_m[None])[0]
+        inside = other.distance_m(rectangle.centre_K_m[None])[0]
         least = min(least, float(inside)) if inside < 0.0 else least  # the rectangle may be wholly inside
     return least
 
 
 def gap_m(one: Neighbour, other: Neighbour) -> float:
-    """Return the distance of two envelopes, negative if one has points inside the other."""
+    """Return the distance of two footprints, negative if one has points inside the other."""
     return float(
         min(
-            signed_distance(one.contour, other.points_K_m).min(),
-            signed_distance(other.contour, one.points_K_m).min(),
+            one.distance_m(other.points_K_m).min(),
+            other.distance_m(one.points_K_m).min(),
         )
     )
 
 
 def wall_gap_m(one: Neighbour, half_extent_m: Array) -> float:
-    """Return the distance of an envelope from the nearest wall."""
+    """Return the distance of a footprint from the nearest wall."""
     return float((half_extent_m - np.abs(one.points_K_m)).min())
 
 

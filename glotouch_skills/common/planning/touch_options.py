@@ -17,10 +17,11 @@ from glotouch_skills.common.planning.squeeze_plan import Stance, schemes, stance
 
 YAWS_RAD = np.deg2rad(np.arange(0.0, 180.0, 30.0))
 """Jaw yaws over a candidate without tracks; half a turn suffices for parallel jaws."""
-BESIDE_RAD = np.deg2rad([0.0, 10.0, -10.0])
-"""Turns from a stance that are tried where the hand does not fit. Source: ours; a third of the step of `YAWS_RAD`."""
-BESIDE_M = (0.0, 0.008, -0.008)
-"""Displacements along x_P that are tried with them. Source: ours; half the width of a pad."""
+BESIDE_RAD = np.deg2rad([0.0, 5.0, -5.0, 10.0, -10.0])
+"""Turns from a stance that are tried where the hand does not fit. Source: ours; up to a third of the step
+of `YAWS_RAD`."""
+BESIDE_M = (0.0, 0.008, -0.008, 0.016, -0.016)
+"""Displacements along x_P that are tried with them. Source: ours; half the width of a pad, and all of it."""
 SAME_M = 0.004
 """A closure within this distance of an earlier one gives no new information ..."""
 SAME_RAD = np.deg2rad(8.0)
@@ -95,7 +96,7 @@ def beside(touchset: TouchSet, at: Stance, gripper: Gripper, side_gap_m: float) 
     along = float((at.position_K_m - candidate.contour.centre_K_m) @ x)
     quarter_m = 0.25 * float(np.ptp(candidate.span_m(at.yaw_K_rad)))
     shifts = [shift for shift in BESIDE_M if not shift or abs(along + shift) <= quarter_m]
-    places = [(along + shift, float(at.yaw_K_rad + turn)) for turn in BESIDE_RAD for shift in shifts]
+    places = [(along + shift, float(at.yaw_K_rad + turn)) for shift in shifts for turn in BESIDE_RAD]
     found = (stance(candidate, along_m, yaw_rad, side_gap_m, gripper) for along_m, yaw_rad in places[1:])
     return [s for s in found if s is not None and not _used(touchset, s)]
 

@@ -12,6 +12,7 @@ from glotouch_bt.perception.search import SearchMap
 from glotouch_bt.perception.touch import Contact, GuardParams
 from glotouch_bt.skill.probing.guarded_probe import Prober
 from glotouch_skills.explore.guarded_sweep import GuardedSweep
+from tests.support.outlines import rectangle
 from tests.support.swept_area import covered_fraction
 
 POST, RADIUS, TOP = (0.03, -0.04), 0.03, 0.06
@@ -129,7 +130,7 @@ def test_what_was_touched_by_the_way_is_looked_at_first(make) -> None:
 def test_guarded_sweep__search_exhausted__a_lid_covers_the_container(make) -> None:
     """No move in is possible: each is refused with its reason, its place given up, and the search says so."""
     b, skill = make(start=(-0.05, 0.1, 0.14))
-    b.arm.scene.add_obstacle("lid", "box", centre_K_m=(0, 0), size_m=(0.3, 0.4), height_m=0.02, base_K_m=0.06)
+    b.arm.scene.add_obstacle("lid", rectangle((0, 0), (0.3, 0.4)), height_m=0.02, base_K_m=0.06)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "search_exhausted")
     assert any("refused" in e["text"] and "lid" in e["text"] for e in b.of_kind("note"))

@@ -12,6 +12,7 @@ from glotouch_bt.perception.search import SearchMap, trace
 from glotouch_bt.perception.touch import Contact, GuardParams, fit_contour
 from glotouch_bt.skill.probing.guarded_probe import Prober
 from glotouch_skills.explore.orbit_probe import OrbitProbe
+from tests.support.outlines import rectangle
 
 POST, RADIUS, TOP, BALL = (0.02, -0.03), 0.028, 0.055, 0.006
 TOUCH = np.array([POST[0], POST[1] + RADIUS + BALL, 0.018])
@@ -114,7 +115,7 @@ def test_orbit_probe__not_traced(make) -> None:
 def test_an_impossible_way_round_is_a_failure_not_a_crash(make) -> None:
     b, skill = make()
     wall = dataclasses.replace(b.world.container).interior_m[0]
-    b.arm.scene.add_obstacle("block", "box", centre_K_m=(-0.05, 0.0), size_m=(0.05, wall), height_m=0.06)
+    b.arm.scene.add_obstacle("block", rectangle((-0.05, 0.0), (0.05, wall)), height_m=0.06)
     b.run(skill)
     assert skill.status in (Status.SUCCESS, Status.FAILURE)
     if skill.status is Status.FAILURE:

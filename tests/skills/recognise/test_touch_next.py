@@ -188,7 +188,7 @@ def test_a_candidate_that_is_gone_is_left_alone(make) -> None:
 
 
 def test_it_closes_beside_a_stance_where_the_hand_does_not_fit(make, monkeypatch) -> None:
-    """Nothing fits at the yaws of the options, all multiples of 30 degrees; a turn of 10 degrees away, it does."""
+    """Nothing fits at the yaws of the options, all multiples of 30 degrees; a turn of 5 degrees away, it does."""
 
     def require_clear(arm, pose, opening_m, margin_m=0.0) -> None:
         off_deg = np.rad2deg(abs(math.remainder(pose.yaw_rad, math.radians(30.0))))
@@ -199,7 +199,7 @@ def test_it_closes_beside_a_stance_where_the_hand_does_not_fit(make, monkeypatch
     b, skill = make(Oracle(right=1, enough=1))
     repeat(b, skill)
     (sequence,) = skill.touchsets[1].sequences
-    assert abs(math.remainder(sequence.yaw_rad, math.radians(30.0))) == pytest.approx(math.radians(10.0), abs=1e-3)
+    assert abs(math.remainder(sequence.yaw_rad, math.radians(30.0))) == pytest.approx(math.radians(5.0), abs=1e-3)
     turned = b.of_kind("closure")[0]["chosen"].yaw_K_rad - sequence.yaw_rad
     assert math.remainder(turned, math.pi) == pytest.approx(0.0, abs=1e-6)
     assert not skill.refused

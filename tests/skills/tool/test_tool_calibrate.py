@@ -10,6 +10,7 @@ from py_trees.common import Status
 
 from glotouch_skills.common.probe.free_corner import corner_place, corner_walls, corners
 from glotouch_skills.tool.tool_calibrate import ToolCalibrate
+from tests.support.outlines import rectangle
 
 STIFFNESS_N_M = 20_000.0
 
@@ -137,7 +138,7 @@ def test_tool_calibrate__slipped(make) -> None:
 
 def test_tool_calibrate__motion_refused(make) -> None:
     b, skill = make()
-    b.arm.scene.add_obstacle("crate", "box", centre_K_m=(-0.13, -0.18), size_m=(0.06, 0.06), height_m=0.3)
+    b.arm.scene.add_obstacle("crate", rectangle((-0.13, -0.18), (0.06, 0.06)), height_m=0.3)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "motion_refused")
     assert not b.arm.scene._allowed

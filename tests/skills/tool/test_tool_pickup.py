@@ -11,6 +11,7 @@ from py_trees.common import Status
 from glotouch_bt.robot import Command, GripperTarget, GuardTripped
 from glotouch_skills.common.hand.line_guard import MAX_OFF_LINE_M
 from glotouch_skills.tool.tool_pickup import MAX_APPROACH_FORCE_N, MAX_PULL_FORCE_N, ToolPickup
+from tests.support.outlines import rectangle
 
 STOWED = np.array([0.45, -0.32, -0.06])
 WEIGHT_N = 0.060 * 9.81
@@ -190,7 +191,7 @@ def test_tool_pickup__motion_refused(make) -> None:
     """A thing in the way up to which the hand would have to go through."""
     b, skill = make()
     K = b.world.container.pose_B_K.inverse().apply(b.world.holder.pose_B_grasp.position_m)
-    b.arm.scene.add_obstacle("crate", "box", centre_K_m=K[:2], size_m=(0.2, 0.2), height_m=0.3)
+    b.arm.scene.add_obstacle("crate", rectangle(K[:2], (0.2, 0.2)), height_m=0.3)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "motion_refused")
     assert "crate" in skill.reason.message

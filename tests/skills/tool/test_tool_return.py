@@ -9,6 +9,7 @@ import pytest
 from py_trees.common import Status
 
 from glotouch_skills.tool.tool_return import ToolReturn
+from tests.support.outlines import rectangle
 
 STOWED = np.array([0.45, -0.32, -0.06])
 
@@ -62,7 +63,7 @@ def test_a_tool_that_slid_in_the_jaws_is_put_where_it_stood(make) -> None:
 def test_tool_return__motion_refused(make) -> None:
     b, skill = make()
     # A bar between the container and the holder, as high as the hand.
-    b.arm.scene.add_obstacle("bar", "box", centre_K_m=(-0.1, -0.2), size_m=(0.6, 0.02), height_m=0.5)
+    b.arm.scene.add_obstacle("bar", rectangle((-0.1, -0.2), (0.6, 0.02)), height_m=0.5)
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "motion_refused")
     assert b.arm.scene.holding_tool

@@ -139,16 +139,28 @@ def shrunk_convex(hull_m: Array, by_m: float) -> Array:
 
 def polygon_distance(polygon_m: Array, points_m: Array) -> Array:
     """Return signed distances (k,) of points (k, 2) from a polygon's outline, negative inside (even-odd rule)."""
-    a, b = polygon_m, np.roll(polygon_m, -1, axis=0)
-    edge, d = b - a, points_m[:, None, :] - a
-    t = np.clip(np.einsum("knj,nj->kn", d, edge) / np.maximum(np.sum(edge * edge, axis=1), 1e-18), 0.0, 1.0)
-    gap = d - t[..., None] * edge
-    distance = np.sqrt(np.min(np.sum(gap * gap, axis=2), axis=1))
-    x, y = points_m[:, :1], points_m[:, 1:]
-    spans = (a[:, 1] > y) != (b[:, 1] > y)
-    rise = np.where(edge[:, 1] == 0.0, 1.0, edge[:, 1])
-    crossed = spans & (x < a[:, 0] + (y - a[:, 1]) / rise * edge[:, 0])
-    return np.asarray(np.where(np.sum(crossed, axis=1) % 2 == 1, -distance, distance))
+    found = np.zeros(len(points_m))
+    _polygon_distance(polygon_m, points_m, found)
+    return found
+
+
+@compiled("given f8[:, :]", "given f8[:, :]", "f8[::1]")
+def _polygon_distance(polygon: Array, points: Array, found: Array) -> None:
+    """See `polygon_distance`; `found` is filled."""
+    for i in range(len(points)):
+        x, y = points[i, 0], points[i, 1]
+        least, inside = np.inf, False
+        for j in range(len(polygon)):
+            ax, ay = polygon[j - 1, 0], polygon[j - 1, 1]  # the last edge first
+            by = polygon[j, 1]
+            ex, ey = polygon[j, 0] - ax, by - ay
+            along = ((x - ax) * ex + (y - ay) * ey) / max(ex * ex + ey * ey, 1e-18)
+            along = min(max(along, 0.0), 1.0)
+            gx, gy = x - ax - along * ex, y - ay - along * ey
+            least = min(least, gx * gx + gy * gy)
+            if (ay > y) != (by > y) and x < ax + (y - ay) / ey * ex:
+                inside = not inside
+        found[i] = -np.sqrt(least) if inside else np.sqrt(least)
 
 
 def nearest_distance(points_m: Array, others_m: Array) -> Array:

@@ -1,8 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from glotouch_bt.perception.touch import Candidate, Contact, Contour
-from glotouch_bt.perception.touch.outline.envelope import envelope
+from glotouch_bt.perception.touch.outline.envelope import KNOWN_QUALITY, envelope, footprint
 
 
 def _candidate(points: np.ndarray) -> Candidate:
@@ -37,3 +39,14 @@ def test_envelope_contains_all_points() -> None:
     for _ in range(30):
         points = rng.normal(0.0, 0.02, (9, 2)) * [1.0, rng.uniform(0.3, 1.0)]
         assert (envelope(_candidate(points)).residuals_m <= 1e-12).all()
+
+
+def test_footprint_of_an_uncertain_outline_is_what_was_met() -> None:
+    """Two contacts, and a circle of 60 mm that was never felt: presumed, it counts; else only the contacts do."""
+    known = _candidate(np.array([[-0.01, 0.0], [0.01, 0.0]]))
+    outline = replace(known.contour, centre_K_m=np.array([0.0, 0.03]), size_m=(0.06, 0.06))
+    doubtful = replace(known, contour=outline, quality=KNOWN_QUALITY - 0.01)
+    assert np.ptp(footprint(doubtful), axis=0) == pytest.approx([0.06, 0.06], abs=1e-4)
+    np.testing.assert_allclose(np.ptp(footprint(doubtful, presumed=False), axis=0), [0.024, 0.004], atol=1e-12)
+    sure = replace(doubtful, quality=KNOWN_QUALITY)
+    np.testing.assert_array_equal(footprint(sure, presumed=False), footprint(sure))

@@ -35,8 +35,8 @@ def stands_at(place: FreePlace, thing):
 def test_the_gap_of_two_discs_is_the_distance_less_their_radii(found, shift_m: float) -> None:
     one, other = (Neighbour.of(found.round((0.0, y), r)) for y, r in ((0.0, 0.02), (-0.02, 0.03)))
     gap = free_gap_m(one, np.array([[0.0, shift_m]]), [other], HALF)[0]
-    radii = 0.5 * (one.contour.size_m[0] + other.contour.size_m[0])
-    assert gap == pytest.approx(min(0.02 + shift_m - radii, 0.2 - shift_m - 0.5 * one.contour.size_m[0]), abs=3e-4)
+    radius, other_radius = (0.5 * np.ptp(n.points_K_m[:, 0]) for n in (one, other))
+    assert gap == pytest.approx(min(0.02 + shift_m - radius - other_radius, 0.2 - shift_m - radius), abs=3e-4)
 
 
 def test_a_turned_box_reaches_the_wall_with_its_other_side(found) -> None:

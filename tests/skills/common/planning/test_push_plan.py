@@ -75,7 +75,7 @@ def test_a_displacement_carries_contacts_and_outline_along(found) -> None:
 
 def test_distances_of_rectangles_and_circles(found) -> None:
     other = Neighbour.of(found.round((0.05, 0.0), 0.02))
-    radius = 0.5 * other.contour.size_m[0]
+    radius = 0.5 * float(np.ptp(other.points_K_m[:, 0]))
     at = Rectangle(np.zeros(2), 0.0, np.array([0.01, 0.01]))
     assert clearance_m(at, [other], HALF) == pytest.approx(0.04 - radius, abs=2e-4)
     at_wall = Rectangle(np.array([0.145, 0.0]), 0.0, np.array([0.01, 0.01]))
