@@ -98,7 +98,9 @@ class TouchNext(Skill):
     )  # fmt: skip
     jaw_zero = In(JawZero, "offset of the reported aperture", required=False, expected=False)
     touchsets = Out(tuple, "touches, one TouchSet for each candidate", element=TouchSet)
-    refused = Out(tuple, "closures that could not be made: candidate, yaw in degrees, height and place in mm")
+    refused = Out(
+        tuple, "closures that could not be made: candidate, yaw in degrees, height and place in mm, and if it was tried"
+    )
     doubtful = Out(
         tuple,
         "indices of candidates that may be elsewhere or have another outline: a closure met something, all met "
@@ -146,7 +148,8 @@ class TouchNext(Skill):
             made = {t.candidate.index: t.sequences for t in touchsets}
             touchsets = tuple(TouchSet(c, made.get(c.index, ())) for c in wanted)
             same = {c.index for c in wanted if _state(c) in before}
-            self.refused = tuple(key for key in refused if key[0] in same)
+            # What did not fit may fit now: it depends on the others, too.
+            self.refused = tuple(key for key in refused if key[0] in same and key[-1])
             self._down = None
         down, self._down = self._down, None  # after a preemption the hand's place is unknown
         stood, self._stood_B_m = self._stood_B_m, None
@@ -176,7 +179,7 @@ class TouchNext(Skill):
         try:
             down, layer = yield from self._touch(candidates, chosen, down)
         except MotionRefused as refusal:
-            self._refuse(chosen)
+            self._refuse(chosen, tried=True)
             self.doubtful = tuple(sorted({*self.doubtful, chosen.closure.candidate}))
             self.event("note", text=f"a closure on candidate {chosen.closure.candidate} was not made: {refusal}")
             return
@@ -211,7 +214,7 @@ class TouchNext(Skill):
         It may be on a candidate that the probe must measure first; the time of that counts.
         """
         p = self.params
-        found = [o for o in self._options(belief, down) if _key(o) not in self.refused]
+        found = [o for o in self._options(belief, down) if not self._was_refused(o)]
         found = [o for o in found if o.closure.candidate not in self._hopeless]
         later = self._unmeasured(belief)
         found = [replace(o, seconds=o.seconds + MEASURE_S) if o.closure.candidate in later else o for o in found]
@@ -256,14 +259,14 @@ class TouchNext(Skill):
             if score[i] <= 0.0:
                 break
             option: Option = found[i]
-            if _key(option) in self.refused:
+            if self._was_refused(option):
                 continue
             try:
                 at = option.at
                 if down is None or at is not down.at:
                     at = fitting_stance(self.context, belief, option, self.params.side_gap_m)
             except MotionRefused as refusal:
-                self._refuse(option)
+                self._refuse(option, tried=False)
                 self._unfit.setdefault(option.closure.candidate, []).append(str(refusal))
                 continue
             # The gain stays that of the option: a stance this close is expected to tell about the same.
@@ -274,7 +277,7 @@ class TouchNext(Skill):
     def _lacking_space(self, belief: Belief, found: list[Option]) -> tuple[int, ...]:
         """Return the candidates for whose closures, of those found, space should be made, most probable first."""
         p, later = self.params, self._unmeasured(belief)
-        refused = [o for o in found if _key(o) in self.refused and o.closure.candidate not in later]
+        refused = [o for o in found if self._was_refused(o) and o.closure.candidate not in later]
         wanted = recognition.wanted(belief, p.confidence, self._hopeless) | recognition.hardly_felt(belief)
         return lacking_space(self.context, belief, refused, p, p.min_gain_nats, wanted)
 
@@ -285,9 +288,12 @@ class TouchNext(Skill):
             self.event("note", text=f"{len(causes)} of the closures on candidate {index} do not fit: {cause}")
         self._unfit.clear()
 
-    def _refuse(self, option: Option) -> None:
-        """Record that a closure could not be made, for this skill and for later ones."""
-        self.refused = (*self.refused, _key(option))
+    def _refuse(self, option: Option, *, tried: bool) -> None:
+        """Record that a closure could not be made, or that the hand does not fit, for this skill and for later ones."""
+        self.refused = (*self.refused, (*_key(option), tried))
+
+    def _was_refused(self, option: Option) -> bool:
+        return any(key[:-1] == _key(option) for key in self.refused)
 
     def _touch(
         self, candidates: tuple[Candidate, ...], chosen: Option, down: Squeezing | None

@@ -16,6 +16,7 @@ import glotouch_skills.recognise.closure_space as closure_space
 import glotouch_skills.recognise.touch_next as module
 from glotouch_bt.perception.recognition import PARTS, Closure, Match, ProbeTouch, Ranking
 from glotouch_bt.perception.recognition.likelihood.params import LikelihoodParams
+from glotouch_bt.perception.touch import TouchSet
 from glotouch_bt.robot import MotionRefused
 from glotouch_skills.common.hand import NoSpace
 from glotouch_skills.recognise.touch_next import TouchNext
@@ -317,6 +318,20 @@ def test_a_refused_closure_is_not_tried_again_by_a_later_node(make, things) -> N
     _, second = make(Oracle(right=1, enough=3), stuff=[floor], tip_P_m=0.022, **known)
     assert repeat(b, second) == 1
     assert second.refused == first.refused
+
+
+def test_what_did_not_fit_is_tried_again_when_a_neighbour_is_known_better(make, found) -> None:
+    """What the fingers met is still there; what a neighbour's outline kept them from may be free."""
+    one, other = found.round((0.0, -0.08), 0.025), found.round((0.0, 0.08), 0.025, index=1)
+    felt = tuple(TouchSet(c, ()) for c in (one, other))
+    refused = ((0, 0, 27, 0, True), (0, 30, 27, 0, False))
+    known = {"felt": felt, "refused": refused, "doubtful": ()}
+    b, same = make(Oracle(right=1, enough=0), things=(one, other), **known)
+    b.run(same)
+    assert same.refused == refused
+    b, better = make(Oracle(right=1, enough=0), things=(one, replace(other, height_m=0.09)), **known)
+    b.run(better)
+    assert better.refused == refused[:1]
 
 
 def test_touch_next__no_candidates__or_unusable_target(make, found) -> None:
