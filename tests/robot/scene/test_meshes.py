@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from glotouch_bt.robot import BadInput
-from glotouch_bt.robot.scene import is_sound_stl, load_folder, load_mesh
+from glotouch_bt.robot.scene import is_sound_stl, load_folder, load_mesh, meshes
 
 SIZE = np.array([0.06, 0.04, 0.05])
 
@@ -101,6 +101,15 @@ def test_the_quick_check_accepts_a_closed_solid(solid: trimesh.Trimesh, tmp_path
     path = write(tmp_path / "good.stl", solid.triangles)
     assert is_sound_stl(path)
     load_mesh(path)
+
+
+@pytest.mark.parametrize("solid", [block(), trimesh.creation.icosphere(3, 0.05), trimesh.creation.torus(0.04, 0.012)])
+def test_a_sound_solid_is_read_as_trimesh_reads_it(solid: trimesh.Trimesh, tmp_path: Path) -> None:
+    data = write(tmp_path / "good.stl", solid.triangles).read_bytes()
+    quick = meshes._sound(data)
+    assert quick is not None
+    for found, expected in zip(quick, meshes._repaired(Path("good.stl"), data), strict=True):
+        assert np.array_equal(found, expected)
 
 
 def test_the_quick_check_leaves_doubtful_solids_to_load_mesh(tmp_path: Path) -> None:
