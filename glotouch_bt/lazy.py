@@ -59,7 +59,7 @@ def on_load_all(load: Callable[[], object]) -> None:
 
 
 def load_all() -> None:
-    """Load every lazy module now. A run does so before it starts, so that no import delays a control period."""
+    """Load every lazy module now, so that no import delays a control period of a robot that would not wait."""
     gc.disable()  # what a module makes stays; a collection would find nothing
     try:
         for package, file in _DOORS:
@@ -72,6 +72,11 @@ def load_all() -> None:
             load()
     finally:
         gc.enable()
+    settle_garbage()
+
+
+def settle_garbage() -> None:
+    """Keep what there is now out of all later collections of garbage, and make those rare."""
     if gc.get_freeze_count():
         gc.collect()  # what an earlier run in this process has left would be kept for ever
     gc.freeze()  # a collection while the arm moves looks at what is made from now on only
