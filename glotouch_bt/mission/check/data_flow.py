@@ -10,7 +10,7 @@ because the interleavings of its children are not followed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from glotouch_bt.mission.check.requirements import Requirements, verdicts
@@ -110,15 +110,17 @@ class DataFlow:
             return self._coarse.found(requirement)
         return self.sets.values(self.judged(requirement), requirement.variable)
 
-    def note(self, requirement: Requirement, entry: int) -> None:
-        """Note that a requirement is looked at in these states."""
-        self.looked[requirement] = self.sets.union(self.looked.get(requirement, EMPTY), entry)
+    def note(self, requirements: Sequence[Requirement], entry: int) -> None:
+        """Note that requirements are looked at in these states; they are always looked at together."""
+        if requirements:
+            looked = self.sets.union(self.looked.get(requirements[0], EMPTY), entry)
+            self.looked.update(dict.fromkeys(requirements, looked))
 
     def look(self, node: NodeSpec, port: str, entry: int) -> Requirement | None:
         """Note that the node reads a port (or resource) in these states; returns the requirement."""
         found = next((r for r in self.requirements[id(node)] if r.port == port), None)
         if found is not None:
-            self.note(found, entry)
+            self.note((found,), entry)
         return found
 
     def where(self, entry: int, variable: int, values: Iterable[int]) -> int:

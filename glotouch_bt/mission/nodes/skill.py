@@ -125,15 +125,15 @@ class SkillKind(NodeKind):
     def exits(self, flow: DataFlowAnalysis, node: NodeSpec, entry: int) -> ExitStates:
         """Assume that the skill may succeed, fail, and be preempted, in any state that meets its requirements."""
         sets, requirements = flow.sets, flow.requirements[id(node)]
-        for requirement in requirements:
-            flow.note(requirement, entry)
-        for requirement in requirements:
+        if id(node) not in flow.facts:  # a variable that is not followed changes nothing
+            needs = [r for r in requirements if sets.follows(r.variable)]
+            flow.facts[id(node)] = needs, [c for c in _changes(node, flow.variables) if sets.follows(c.variable)]
+        needs, changes = flow.facts[id(node)]
+        flow.note(requirements, entry)
+        for requirement in needs:
             entry = flow.meeting(entry, requirement)
-        leaves = flow.facts.get(id(node))
-        if leaves is None:
-            leaves = flow.facts[id(node)] = tuple(c for c in _changes(node, flow.variables) if sets.follows(c.variable))
         success = failure = running = entry
-        for change in leaves:
+        for change in changes:
             if change.success is not None:
                 success = sets.assign(success, change.variable, change.success)
             if change.may_stay:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
@@ -108,8 +108,8 @@ class DataFlowAnalysis(Protocol):
     def unknown(self, entry: int) -> ExitStates:
         """Return the exit states of a node of which nothing is known."""
 
-    def note(self, requirement: Requirement, entry: int) -> None:
-        """Note that a requirement is looked at in these states."""
+    def note(self, requirements: Sequence[Requirement], entry: int) -> None:
+        """Note that requirements are looked at in these states; they are always looked at together."""
 
     def look(self, node: NodeSpec, port: str, entry: int) -> Requirement | None:
         """Note that the node reads a port (or resource) in these states; returns the requirement."""
