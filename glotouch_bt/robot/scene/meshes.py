@@ -97,18 +97,11 @@ def triangles_of(data: bytes) -> npt.NDArray[np.void] | None:
     return np.frombuffer(data, _FACET, offset=84) if len(data) == 84 + _FACET.itemsize * count else None
 
 
-def is_sound_stl(path: Path) -> bool:
-    """Return True if a binary STL is surely a solid that `load_mesh` accepts: closed, in one piece, of a valid size.
+def sound_solid(data: bytes) -> tuple[Array, Faces] | None:
+    """Return the corners and faces of a binary STL that is surely a solid: closed, in one piece, of a valid size.
 
-    False leaves the verdict to `load_mesh`. This takes milliseconds and only numpy.
-    """
-    return _sound(read_stl(path)) is not None
-
-
-def _sound(data: bytes) -> tuple[Array, Faces] | None:
-    """Return the corners and faces of a binary STL that is surely a solid, as trimesh numbers them; None: perhaps not.
-
-    Corners are numbered as they first occur. Those that are equal to `MERGE_DECIMALS[0]` are one.
+    None leaves the verdict to `repaired_solid`, which gives the same for a sound one. This takes milliseconds and only
+    numpy. Corners are numbered as they first occur. Those that are equal to `MERGE_DECIMALS[0]` are one.
     """
     triangles = triangles_of(data)
     if triangles is None or not 4 <= len(triangles) <= MAX_TRIANGLES:
@@ -177,7 +170,7 @@ def load_mesh(path: Path) -> Mesh:
 
 def solid_of(path: Path, data: bytes) -> Mesh:
     """Return the solid in the content of an STL file; errors as for `load_mesh`, under the name `path`."""
-    found, faces = _sound(data) or _repaired(path, data)
+    found, faces = sound_solid(data) or repaired_solid(path, data)
     vertices = np.array(found, dtype=np.float64)
     vertices[:, :2] -= np.round(0.5 * (vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0)), 6)
     vertices[:, 2] -= vertices[:, 2].min()
@@ -188,8 +181,8 @@ def solid_of(path: Path, data: bytes) -> Mesh:
     return Mesh(path.stem, vertices, faces, digest)
 
 
-def _repaired(path: Path, data: bytes) -> tuple[Array, Faces]:
-    """Return the corners and faces of an STL file that needs a closer look, or repair."""
+def repaired_solid(path: Path, data: bytes) -> tuple[Array, Faces]:
+    """Return the corners and faces of an STL file that may need repair; errors as for `load_mesh`."""
     data = bounded_stl(path, data)
     try:
         mesh = trimesh.load_mesh(io.BytesIO(data), file_type="stl", process=True)
