@@ -50,6 +50,12 @@ def test_a_simulated_world_opens_without_what_only_recognition_needs() -> None:
     assert not {"trimesh", "scipy.ndimage", "matplotlib"} & set(loaded_after(code + opening))
 
 
+def test_scipy_loads_no_part_of_numpy_that_it_does_not_use() -> None:
+    code = "import glotouch_bt.robot, scipy; scipy.spatial.ConvexHull\n"
+    spared = "assert not {'numpy.f2py.crackfortran', 'numpy.testing.overrides'} & set(sys.modules)\n"
+    loaded_after(code + spared + "import numpy; numpy.testing.assert_allclose(1.0, 1.0); assert numpy.f2py.get_include")
+
+
 def test_load_all_does_not_keep_what_an_earlier_run_left() -> None:
     code = (
         "import gc, weakref\nfrom glotouch_bt.lazy import load_all\nload_all(); gc.disable()\n"
