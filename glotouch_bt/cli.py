@@ -17,6 +17,7 @@ from glotouch_bt import __version__
 from glotouch_bt.commands import COMMANDS, bench
 from glotouch_bt.commands.shared import set_debug, with_bare_values
 from glotouch_bt.interrupts import repeat_lost_interrupts
+from glotouch_bt.lazy import collect_rarely
 
 
 class GroupedHelp(TyperGroup):
@@ -70,6 +71,14 @@ def _options(
         set_debug()
 
 
+def _keep_called(name: str) -> None:
+    """Leave the app only the command or group that is called, because Typer builds the options of all, 0.1 s."""
+    commands = [c for c in app.registered_commands if c.name == name]
+    groups = [g for g in app.registered_groups if g.typer_instance and g.typer_instance.info.name == name]
+    if commands or groups:
+        app.registered_commands, app.registered_groups = commands, groups
+
+
 def main() -> None:
     """Run the `glotouch` command; `--debug` may stand anywhere."""
     if os.name != "posix":
@@ -77,6 +86,9 @@ def main() -> None:
     if "--debug" in sys.argv[1:]:
         set_debug()
         sys.argv = [a for a in sys.argv if a != "--debug"]
+    if sys.argv[1:]:
+        _keep_called(sys.argv[1])
+    collect_rarely()
     repeat_lost_interrupts()
     try:
         app()

@@ -31,13 +31,32 @@ def lazy_module(name: str) -> ModuleType:
     _MODULES.append(name)
     if name in sys.modules:
         return sys.modules[name]
+    if not _put_off(name):
+        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+    return sys.modules[name]
+
+
+def spare(*names: str) -> None:
+    """Put off the loading of modules of a package that others look up there and do not use: SciPy copies every name of
+    NumPy. They are loaded on the first access to one of their attributes, and not by `load_all`.
+    """
+    for name in names:
+        if name not in sys.modules:
+            _put_off(name)
+
+
+def _put_off(name: str) -> bool:
+    """Make a module that is loaded on the first access to one of its attributes; return False if there is none."""
     spec = importlib.util.find_spec(name)
     if spec is None or spec.loader is None:
-        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        return False
     spec.loader = importlib.util.LazyLoader(spec.loader)
     module = sys.modules[name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module
+    package, _, own = name.rpartition(".")
+    if package:
+        setattr(sys.modules[package], own, module)
+    return True
 
 
 def lazy_door(package: str, **files: str) -> Callable[[str], Any]:
@@ -59,7 +78,7 @@ def on_load_all(load: Callable[[], object]) -> None:
 
 
 def load_all() -> None:
-    """Load every lazy module now. A run does so before it starts, so that no import delays a control period."""
+    """Load every lazy module now, so that no import delays a control period of a robot that would not wait."""
     gc.disable()  # what a module makes stays; a collection would find nothing
     try:
         for package, file in _DOORS:
@@ -72,7 +91,17 @@ def load_all() -> None:
             load()
     finally:
         gc.enable()
+    settle_garbage()
+
+
+def settle_garbage() -> None:
+    """Keep what there is now out of all later collections of garbage."""
     if gc.get_freeze_count():
         gc.collect()  # what an earlier run in this process has left would be kept for ever
     gc.freeze()  # a collection while the arm moves looks at what is made from now on only
+    collect_rarely()
+
+
+def collect_rarely() -> None:
+    """Make collections of garbage rare, also while modules are loaded: what they make stays."""
     gc.set_threshold(GARBAGE_OBJECTS)

@@ -91,6 +91,7 @@ class MujocoBackend(Backend):
         "no display needed"
     )
     description = RIZON4_XENSE
+    clock_waits = True
 
     def __init__(self, limits: Limits | None = None) -> None:
         self._limits = limits or Limits()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from glotouch_bt.robot import RobotDescription, UnknownName, read_robot
@@ -30,4 +31,7 @@ def load_robot(given: str) -> RobotDescription:
     shipped = shipped_robots()
     if given not in shipped:
         raise UnknownName("robot", given, [*shipped, "FILE.yaml"])
-    return read_robot(shipped[given])
+    return _read_shipped(shipped[given])
+
+
+_read_shipped = cache(read_robot)

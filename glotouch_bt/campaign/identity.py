@@ -7,7 +7,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from functools import cache, lru_cache
-from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -32,7 +31,7 @@ SOURCES = (".py", ".yaml", ".urdf")
 @cache
 def code_versions() -> dict[str, str]:
     """Return the digest of the source files of each package that takes part in a run, by its name."""
-    others = {point.module.partition(".")[0] for group in GROUPS for point in entry_points(group=group)}
+    others = {point.module.partition(".")[0] for group in GROUPS for point in plugins.plugins(group).values()}
     return {name: _source_digest(name) for name in sorted({*OURS, *others})}
 
 

@@ -1,5 +1,8 @@
 """The report of a run: `read_run` returns its arrays and events, `write_report` writes report.html."""
 
+from typing import TYPE_CHECKING
+
+from glotouch_bt.lazy import lazy_door
 from glotouch_bt.report.run_record import (
     ALL_TOPICS,
     FILM_NAME,
@@ -13,6 +16,18 @@ from glotouch_bt.report.run_record import (
     Tick,
     read_run,
 )
-from glotouch_bt.report.sections import depth_png, palette
-from glotouch_bt.report.svg import AxisScale, points, tick_text
-from glotouch_bt.report.write import write_report
+
+if TYPE_CHECKING:
+    from glotouch_bt.report.sections import depth_png, palette
+    from glotouch_bt.report.svg import AxisScale, points, tick_text
+    from glotouch_bt.report.write import write_report
+
+__getattr__ = lazy_door(
+    __name__,
+    depth_png="sections",
+    palette="sections",
+    AxisScale="svg",
+    points="svg",
+    tick_text="svg",
+    write_report="write",
+)

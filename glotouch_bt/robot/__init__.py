@@ -16,6 +16,7 @@ from glotouch_bt.errors import (
     StaleReading,
     UnknownName,
 )
+from glotouch_bt.lazy import spare
 from glotouch_bt.robot.command import (
     HOLD,
     Command,
@@ -45,3 +46,5 @@ from glotouch_bt.robot.limits import Limits
 from glotouch_bt.robot.observation import SAMPLED, GelImages, GripperState, ImageArray, Observation, TactileFrame
 from glotouch_bt.robot.registry import backend_entry_points, load_backend
 from glotouch_bt.robot.scene import Conditions, Container, Holder, ObjectSet, Probe, World
+
+spare("numpy.f2py", "numpy.testing")

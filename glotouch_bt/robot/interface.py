@@ -101,6 +101,9 @@ class Backend(ABC):
     summary: str
     description: RobotDescription | None = None
     """The robot that it opens, apart from what the device itself reports; None if only an open robot can tell."""
+    clock_waits: bool = False
+    """True if no time passes on a robot's clock between two cycles, with any options. A run then starts before all
+    modules are loaded; the first tick that needs one waits for it."""
 
     @abstractmethod
     def open(self, world: World, conditions: Conditions, seed: int, options: Mapping[str, object]) -> Robot:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 
 from glotouch_bt.errors import BackendError, UnknownName
+from glotouch_bt.plugins import plugins
 from glotouch_bt.robot.interface import Backend
 
 GROUP = "glotouch_bt.backends"
@@ -12,7 +13,7 @@ GROUP = "glotouch_bt.backends"
 
 def backend_entry_points() -> dict[str, EntryPoint]:
     """Return the installed backends by name without importing them."""
-    return {e.name: e for e in entry_points(group=GROUP)}
+    return plugins(GROUP)
 
 
 def load_backend(name: str) -> Backend:

@@ -13,10 +13,9 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from glotouch_bt.faults import FaultInjector, FaultPlan, ListeningRecord, injector_in, read_plan, wrong_models
-from glotouch_bt.lazy import load_all
+from glotouch_bt.lazy import load_all, settle_garbage
 from glotouch_bt.mission import Mission, load_mission, missing_parts, split_settings
 from glotouch_bt.mission.checkpoint import CHECKPOINT_FILE, CheckpointFile, CheckpointWriter, ResumePoint
 from glotouch_bt.mission.execution import Control, Outcome, SkillHung, deferred_interrupt, run_mission
@@ -40,6 +39,9 @@ from glotouch_bt.runs.request import RunRequest, RunResult
 from glotouch_bt.runs.result import description, final_truth, installed_versions, mission_yaml, score, truth
 from glotouch_bt.runs.resume_point import ResumableRun, describe_checkpointed_run
 from glotouch_bt.runs.robot_identity import require_same_robot, robot_identity
+
+if TYPE_CHECKING:
+    from glotouch_bt.faults import FaultInjector, FaultPlan
 
 MAX_SEED = 2**32 - 1
 RECORD_PART = ".run.mcap.part"
@@ -77,7 +79,8 @@ def launch(
     conditions = load_conditions(request.conditions) if resumable is None else resumable.conditions
     plan = _fault_plan(request, mission)
     backend = load_backend(request.backend)
-    load_all()
+    if not backend.clock_waits:
+        load_all()
     options = split_settings(mission, request.settings)
     if resumable is not None:
         options = resumable.options(backend, options)
@@ -86,8 +89,8 @@ def launch(
         try:
             if resumable is None:
                 folder.check_free(request.overwrite)
-            if plan is not None and resumable is None and (models := wrong_models(plan, mission, folder.path / MODELS)):
-                mission = _mission(request, **models)
+            if plan is not None and resumable is None:
+                mission = _misled(mission, plan, request, folder.path / MODELS)
             known = backend.describe(options)
             if known is not None:  # before a real arm is enabled
                 _require_suited(known, mission)
@@ -110,6 +113,8 @@ def launch(
                 if world is not None:
                     robot.restore(world)
                 if plan is not None:
+                    from glotouch_bt.faults import FaultInjector
+
                     disturber = backend.disturber(robot)
                     robot = FaultInjector(robot, plan, request.seed, disturber=disturber, may_kill=request.may_kill)
             except BaseException:
@@ -119,6 +124,8 @@ def launch(
             folder.discard()
             raise
         with robot:
+            if backend.clock_waits:
+                settle_garbage()
             if resumable is None:
                 folder.clear()
             if on_start is not None:
@@ -149,9 +156,20 @@ def _mission(request: RunRequest, **more: str) -> Mission:
 
 
 def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:
-    if request.faults is None or isinstance(request.faults, FaultPlan):
-        return request.faults
-    return read_plan(request.faults, mission.spec, mission.name)
+    if request.faults is None:
+        return None
+    from glotouch_bt.faults import FaultPlan, read_plan
+
+    given = request.faults
+    return given if isinstance(given, FaultPlan) else read_plan(given, mission.spec, mission.name)
+
+
+def _misled(mission: Mission, plan: FaultPlan, request: RunRequest, folder: Path) -> Mission:
+    """Return the mission with the wrong models of a fault plan, if it has any."""
+    from glotouch_bt.faults import wrong_models
+
+    models = wrong_models(plan, mission, folder)
+    return _mission(request, **models) if models else mission
 
 
 @dataclass(frozen=True)
@@ -194,9 +212,14 @@ def _run(run: _Run, on_progress: Callable[[float, RunSummary], None] | None, con
     if run.resumable is not None and resume_point is not None:
         begin = partial(run.resumable.begin, recorder.path, recorder, resume_point.same_world)
         resume_point = replace(resume_point, on_restored=begin)
-    injector = injector_in(robot)
     lifts = LiftWitness(recorder, referee)
-    record: Record = lifts if injector is None else ListeningRecord(lifts, injector)
+    record: Record = lifts
+    injector: FaultInjector | None = None
+    if request.faults is not None:
+        from glotouch_bt.faults import ListeningRecord, injector_in
+
+        injector = injector_in(robot)
+        record = lifts if injector is None else ListeningRecord(lifts, injector)
 
     def exit_stuck(stuck: SkillHung, outcome: Outcome) -> None:
         """Write what is known and end the process, because the main thread hangs in a skill."""

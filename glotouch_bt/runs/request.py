@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from glotouch_bt.faults import FaultPlan
 from glotouch_bt.mission.execution import Outcome
 from glotouch_bt.mission.read import split_conditions
+
+if TYPE_CHECKING:
+    from glotouch_bt.faults import FaultPlan
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ class RunRequest:
     def as_json(self) -> dict[str, Any]:
         """Return what is needed to open the same robot and mission again, as JSON data."""
         profile, changes = split_conditions(self.conditions)
-        plan = self.faults.name if isinstance(self.faults, FaultPlan) else self.faults
+        plan = self.faults if self.faults is None or isinstance(self.faults, str | Path) else self.faults.name
         return {
             "mission": _absolute(self.mission),
             "backend": self.backend,

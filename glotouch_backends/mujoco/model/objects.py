@@ -9,6 +9,7 @@ import numpy as np
 
 from glotouch_backends.mujoco.hulls import FOOT_PROTRUSION_M, FOOT_RADIUS_M, foot_centres, load_hulls
 from glotouch_backends.mujoco.model.contact import ENVIRONMENT, GROUP_VISUAL, OBJECT, set_category, set_friction
+from glotouch_backends.mujoco.model.inertia import uniform_inertia
 from glotouch_backends.mujoco.printed import lean_feet, printed_hull
 from glotouch_backends.mujoco.truth import ObjectTruth, rotation_vector
 from glotouch_bt.robot import Array, Pose
@@ -61,12 +62,10 @@ def add_object(spec: mujoco.MjSpec, index: int, truth: ObjectTruth, pose_B_K: Po
     if not fixed:
         body.add_freejoint(name=f"object{index}")
 
-    solid = mesh.as_trimesh()
-    solid.density = truth.mass_kg / solid.volume
-    inertia = np.asarray(solid.moment_inertia)  # about the centre of mass
+    centre, inertia = uniform_inertia(mesh, truth.mass_kg)
     body.explicitinertial = True
     body.mass = truth.mass_kg
-    body.ipos = solid.center_mass + truth.com_error_m
+    body.ipos = centre + truth.com_error_m
     body.fullinertia = (*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2])
 
     for k, part in enumerate(load_hulls(truth.stl)):

@@ -7,6 +7,7 @@ lie inside the handle's outline, so that closed fingers pass them; the slot is w
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -44,15 +45,18 @@ MAX_SHAFT_STIFFNESS_NM_RAD = 170.0
 """Largest stiffness between handle and shaft, or 1 ms steps become unstable; 0.1 mm/N at the ball. Source: ours."""
 GEL_DAMPING_RATIO = 0.5
 """Damping ratio of the shaft in the gel. Source: ours; silicone gels damp strongly."""
+_BOX_FACES = (
+    (1, 3, 0), (4, 1, 0), (0, 3, 2), (2, 4, 0), (1, 7, 3), (5, 1, 4),
+    (5, 7, 1), (3, 7, 2), (6, 4, 2), (2, 7, 6), (6, 5, 4), (7, 5, 6),
+)  # fmt: skip
+"""Faces of a box whose corners are in the order of `itertools.product`; those of `trimesh.creation.box`."""
 HANDLE_COLOUR, STEEL_COLOUR, STAND_COLOUR = (0.15, 0.35, 0.65, 1.0), (0.75, 0.77, 0.80, 1.0), (0.3, 0.32, 0.3, 1.0)
 
 
 def handle_mesh(probe: Probe) -> Mesh:
     """Return the handle as a solid in the probe's body frame; the pads sense it while they hold the probe."""
-    import trimesh
-
-    box = trimesh.creation.box(probe.handle_m)
-    return Mesh("handle", np.array(box.vertices), np.array(box.faces, dtype=np.int64), f"handle {probe.handle_m}")
+    corners = np.array(list(product((-0.5, 0.5), repeat=3))) * probe.handle_m
+    return Mesh("handle", corners, np.array(_BOX_FACES), f"handle {probe.handle_m}")
 
 
 def _compliant(spec: mujoco.MjSpec, body: mujoco.MjsBody, probe: Probe, truth: Truth) -> mujoco.MjsBody:

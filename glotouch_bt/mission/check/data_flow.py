@@ -10,7 +10,8 @@ because the interleavings of its children are not followed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 from glotouch_bt.mission.check.requirements import Requirements, verdicts
 from glotouch_bt.mission.nodes import (
@@ -43,6 +44,7 @@ class DataFlow:
         entered: Ids of the nodes that are entered in some state.
         ends: (node id, True: in success) of the nodes that may end so.
         looked: Set in which each requirement was looked at.
+        facts: What node kinds have found out about each node, by node id, whatever the states it is entered in.
         end: Exit states of the root.
     """
 
@@ -63,6 +65,7 @@ class DataFlow:
         self.entered: set[int] = set()
         self.ends: set[tuple[int, bool]] = set()
         self.looked: dict[Requirement, int] = {}
+        self.facts: dict[int, Any] = {}
         self._known: dict[tuple[int, int], ExitStates] = {}
         self.end = self.run(tree, self.sets.start)
 
@@ -107,11 +110,17 @@ class DataFlow:
             return self._coarse.found(requirement)
         return self.sets.values(self.judged(requirement), requirement.variable)
 
+    def note(self, requirements: Sequence[Requirement], entry: int) -> None:
+        """Note that requirements are looked at in these states; they are always looked at together."""
+        if requirements:
+            looked = self.sets.union(self.looked.get(requirements[0], EMPTY), entry)
+            self.looked.update(dict.fromkeys(requirements, looked))
+
     def look(self, node: NodeSpec, port: str, entry: int) -> Requirement | None:
         """Note that the node reads a port (or resource) in these states; returns the requirement."""
         found = next((r for r in self.requirements[id(node)] if r.port == port), None)
         if found is not None:
-            self.looked[found] = self.sets.union(self.looked.get(found, EMPTY), entry)
+            self.note((found,), entry)
         return found
 
     def where(self, entry: int, variable: int, values: Iterable[int]) -> int:

@@ -15,13 +15,13 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from enum import Enum
 from functools import lru_cache
-from importlib.metadata import entry_points
 from typing import Any, Literal
 
 import msgspec
 import numpy as np
 
 from glotouch_bt.mission.checkpoint.bounds import MAX_VALUES, require_few_values
+from glotouch_bt.plugins import plugins
 from glotouch_bt.robot import BadInput, GlotouchError
 from glotouch_bt.untrusted import field_types, require_type
 
@@ -47,7 +47,7 @@ class NotEncodable(GlotouchError):
 @lru_cache(maxsize=1)
 def known_packages() -> frozenset[str]:
     """Return the top-level packages whose classes a file may name: ours and those that provide skills or backends."""
-    provided = {e.module.partition(".")[0] for group in GROUPS for e in entry_points(group=group)}
+    provided = {e.module.partition(".")[0] for group in GROUPS for e in plugins(group).values()}
     return frozenset(provided | set(OWN_PACKAGES))
 
 

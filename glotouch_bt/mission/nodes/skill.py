@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import product
 from typing import Any, Literal
 
@@ -41,6 +42,40 @@ def written_kind(node: NodeSpec, port: str, result: str) -> ValueKind:
     element = getattr(declared, "element", None) or object
     value = getattr(declared, f"on_{result}", None)
     return ValueKind(node.skill_type.OUTPUT_PORTS[port].data_type, element, unit_of_name(port), value)
+
+
+@dataclass(frozen=True)
+class _Change:
+    """What a skill does to one variable.
+
+    Attributes:
+        variable: The variable.
+        success: Its value after success; None: as before.
+        failure: Its possible values after a failure.
+        may_stay: After a failure it may be as before, too.
+        running: Its possible values when the skill is preempted, besides the one before.
+    """
+
+    variable: int
+    success: int | None
+    failure: tuple[int, ...]
+    may_stay: bool
+    running: tuple[int, ...]
+
+
+def _changes(node: NodeSpec, variables: StateVariables) -> Iterator[_Change]:
+    skill = _skill_of(node)
+    for port, wire in node.writes.items():
+        good, bad, part = (variables.value(wire.key, written_kind(node, port, result)) for result in RESULTS)
+        yield _Change(variables.keys[wire.key], good, (bad,), not _always_writes(skill, port), (part,))
+    for resource in variables.resources:
+        leaves = skill.POSTCONDITIONS.get(resource)
+        after = skill.FAILURE_STATES.get(resource, frozenset({UNCHANGED, leaves or UNCHANGED}))
+        failed = tuple(variables.state(resource, s) for s in after - {UNCHANGED})
+        value = None if leaves is None else variables.state(resource, leaves)
+        if after != {UNCHANGED} or value is not None:
+            running = failed if value is None else (*failed, value)
+            yield _Change(variables.resources[resource], value, failed, UNCHANGED in after, running)
 
 
 class SkillKind(NodeKind):
@@ -89,34 +124,23 @@ class SkillKind(NodeKind):
 
     def exits(self, flow: DataFlowAnalysis, node: NodeSpec, entry: int) -> ExitStates:
         """Assume that the skill may succeed, fail, and be preempted, in any state that meets its requirements."""
-        skill, sets, variables = _skill_of(node), flow.sets, flow.variables
-        for requirement in flow.requirements[id(node)]:
-            flow.look(node, requirement.port, entry)
-        for requirement in flow.requirements[id(node)]:
+        sets, requirements = flow.sets, flow.requirements[id(node)]
+        if id(node) not in flow.facts:  # a variable that is not followed changes nothing
+            needs = [r for r in requirements if sets.follows(r.variable)]
+            flow.facts[id(node)] = needs, [c for c in _changes(node, flow.variables) if sets.follows(c.variable)]
+        needs, changes = flow.facts[id(node)]
+        flow.note(requirements, entry)
+        for requirement in needs:
             entry = flow.meeting(entry, requirement)
         success = failure = running = entry
-        for port, wire in node.writes.items():
-            variable = variables.keys[wire.key]
-            good, bad, part = (variables.value(wire.key, written_kind(node, port, result)) for result in RESULTS)
-            success = sets.assign(success, variable, good)
-            running = sets.allow(running, variable, (part,))
-            if _always_writes(skill, port):
-                failure = sets.assign(failure, variable, bad)
+        for change in changes:
+            if change.success is not None:
+                success = sets.assign(success, change.variable, change.success)
+            if change.may_stay:
+                failure = sets.allow(failure, change.variable, change.failure)
             else:
-                failure = sets.allow(failure, variable, (bad,))
-        for resource, variable in variables.resources.items():
-            leaves = skill.POSTCONDITIONS.get(resource)
-            after = skill.FAILURE_STATES.get(resource, frozenset({UNCHANGED, leaves or UNCHANGED}))
-            states = [variables.state(resource, s) for s in after - {UNCHANGED}]
-            if UNCHANGED in after:
-                failure = sets.allow(failure, variable, states)
-            else:
-                failure = sets.union(*(sets.assign(failure, variable, s) for s in states))
-            if leaves is not None:
-                value = variables.state(resource, leaves)
-                success = sets.assign(success, variable, value)
-                states.append(value)
-            running = sets.allow(running, variable, states)
+                failure = sets.union(*(sets.assign(failure, change.variable, v) for v in change.failure))
+            running = sets.allow(running, change.variable, change.running)
         return ExitStates(success, failure, running)
 
     def step(

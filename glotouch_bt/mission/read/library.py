@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Iterator, Mapping
-from importlib.metadata import EntryPoint, entry_points
+from functools import cache
 from os.path import isfile
 from pathlib import Path
 
+from glotouch_bt.plugins import plugins
 from glotouch_bt.robot import BadInput, UnknownName
 from glotouch_bt.skill import Skill
 
@@ -16,6 +17,7 @@ RESUME_CHECK_GROUP = "glotouch_bt.resume_check"
 """Entry-point group of the one skill that checks the world before a mission resumes in it."""
 
 
+@cache
 def shipped_root() -> Path:
     """Return the folder of shipped missions, of a checkout or of the installed package.
 
@@ -80,7 +82,7 @@ class SkillRegistry(Mapping[str, type[Skill]]):
 
     def __init__(self, group: str = SKILL_GROUP) -> None:
         self._group = group
-        self._points: dict[str, EntryPoint] = {e.name: e for e in entry_points(group=group)}
+        self._points = plugins(group)
         self._loaded: dict[str, type[Skill]] = {}
 
     def __getitem__(self, name: str) -> type[Skill]:

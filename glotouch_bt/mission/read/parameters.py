@@ -32,7 +32,7 @@ from glotouch_bt.mission.spec import (
 )
 from glotouch_bt.perception import read_touched, touched_name
 from glotouch_bt.robot import BadInput, ObjectSet
-from glotouch_bt.robot.scene import is_sound_stl, load_mesh, stl_files
+from glotouch_bt.robot.scene import load_mesh, stl_files
 
 Value = bool | int | float | str
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -296,8 +296,7 @@ def count_objects(objects: ObjectSet) -> int:
 def _fault_of_solid(path: Path, stamp: tuple[int, int] | None) -> str:
     """Return why a file is not a valid solid, or empty. `stamp`: its time and size, for the cache."""
     try:
-        if stamp is None or not is_sound_stl(path):
-            load_mesh(path)
+        load_mesh(path)
     except BadInput as e:
         return str(e)
     return ""

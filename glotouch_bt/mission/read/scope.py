@@ -26,6 +26,7 @@ class Reading:
         used: Every subtree that was read, by its name in the document of the run.
         sources: The source of each: a file, or its name in the `subtrees` section.
         renamed: Place of each `file` setting: the name.
+        files: Content of the files of subtrees; a mission may use one of them many times.
     """
 
     nodes: int = 0
@@ -36,6 +37,7 @@ class Reading:
     used: dict[str, Node] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
     renamed: dict[Place, str] = field(default_factory=dict)
+    files: dict[Path, Node] = field(default_factory=dict)
 
     def carry(self, stem: str, source: str, tree: Node, at: Place) -> str:
         """Note a subtree that the node at `at` uses; return its name in the document of the run."""

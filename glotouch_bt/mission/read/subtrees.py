@@ -63,8 +63,11 @@ def find_subtree(given: str, at: Place, scope: Scope) -> tuple[Path, str, Node] 
         return None
     if given in scope.reading.carried:
         return path, identity, scope.reading.carried[given]
+    files = scope.reading.files
     try:
-        return path, identity, read_named_yaml(path, shown(path), "tree")
+        if path not in files:
+            files[path] = read_named_yaml(path, shown(path), "tree")
+        return path, identity, files[path]
     except BadInput as e:
         near = scope.findings.nearest(given, _subtrees_near(scope))
         scope.findings.add(at, "unusable_subtree", f"subtree cannot be read: {e}", hint=near)

@@ -206,13 +206,13 @@ def _place(event: Any, shown: str) -> Place:
 
 
 def _refuse(event: Any, shown: str) -> None:
-    place = _place(event, shown)
     if isinstance(event, yaml.AliasEvent):
-        raise YamlRefused(place, "aliases (*{}) are not allowed; write the value out", str(event.anchor))
+        raise YamlRefused(_place(event, shown), "aliases (*{}) are not allowed; write the value out", str(event.anchor))
     if getattr(event, "anchor", None):
-        raise YamlRefused(place, "anchors (&{}) are not allowed; write the value out", event.anchor)
+        raise YamlRefused(_place(event, shown), "anchors (&{}) are not allowed; write the value out", event.anchor)
     if getattr(event, "tag", None):
-        raise YamlRefused(place, "tags ({}) are not allowed; only plain values, lists and mappings", event.tag)
+        what = "tags ({}) are not allowed; only plain values, lists and mappings"
+        raise YamlRefused(_place(event, shown), what, event.tag)
 
 
 def _scalar(event: Any, shown: str) -> Scalar:

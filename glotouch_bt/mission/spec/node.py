@@ -69,9 +69,11 @@ class NodeSpec:
 
     def walk(self) -> Iterator[NodeSpec]:
         """Yield this node and all below, parents first."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
+        left = [self]
+        while left:
+            node = left.pop()
+            yield node
+            left.extend(reversed(node.children))
 
     def paths(self, above: str) -> dict[str, NodeSpec]:
         """Return this node and all below by path, parents first; `above` is the parent's path."""

@@ -8,9 +8,10 @@ from glotouch_bt.robot.scene.meshes import (
     MIN_SIZE_M,
     Mesh,
     bounded_stl,
-    is_sound_stl,
     load_mesh,
+    repaired_solid,
     solid_of,
+    sound_solid,
 )
 from glotouch_bt.robot.scene.object_files import MESH_SUFFIXES, load_folder, stl_files, twins_of
 from glotouch_bt.robot.scene.placement import Placement, draw_layout, moved_apart, outline, place_objects

@@ -47,6 +47,7 @@ MIN_VOLUME_M3 = 1e-7
 MERGE_DECIMALS = (8, 6, 5)
 """Decimals of a metre to which corners are rounded, in turn until the mesh is closed. Files of 32 bit floats
 and exporters that scale miss by up to a micrometre."""
+Faces = npt.NDArray[np.int64]
 _UNITS_M = {"millimetres": 0.001, "centimetres": 0.01, "inches": 0.0254}
 """Units in which files are exported by mistake, in metres."""
 
@@ -65,7 +66,7 @@ class Mesh:
 
     name: str
     vertices_m: Array
-    faces: npt.NDArray[np.int64]
+    faces: Faces
     digest: str
 
     @property
@@ -96,32 +97,38 @@ def triangles_of(data: bytes) -> npt.NDArray[np.void] | None:
     return np.frombuffer(data, _FACET, offset=84) if len(data) == 84 + _FACET.itemsize * count else None
 
 
-def is_sound_stl(path: Path) -> bool:
-    """Return True if a binary STL is surely a solid that `load_mesh` accepts: closed, in one piece, of a valid size.
+def sound_solid(data: bytes) -> tuple[Array, Faces] | None:
+    """Return the corners and faces of a binary STL that is surely a solid: closed, in one piece, of a valid size.
 
-    False leaves the verdict to `load_mesh`. This takes milliseconds and only numpy.
+    None leaves the verdict to `repaired_solid`, which gives the same for a sound one. This takes milliseconds and only
+    numpy. Corners are numbered as they first occur. Those that are equal to `MERGE_DECIMALS[0]` are one.
     """
-    triangles = triangles_of(read_stl(path))
+    triangles = triangles_of(data)
     if triangles is None or not 4 <= len(triangles) <= MAX_TRIANGLES:
-        return False
-    count, corners = len(triangles), triangles["corners"].astype(np.float64)
+        return None
+    corners = triangles["corners"].astype(np.float64).reshape(-1, 3)
     if not np.isfinite(corners).all():
-        return False
-    size = np.ptp(corners.reshape(-1, 3), axis=0)
-    volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    if size.max() > MAX_SIZE_M or size.min() < MIN_SIZE_M or abs(volume) < MIN_VOLUME_M3:
-        return False
-    vertex = np.zeros(3 * count, np.int64)
-    for column in corners.reshape(-1, 3).T:  # far quicker than `unique` of rows
-        values, rank = np.unique(column, return_inverse=True)
-        vertex = np.unique(vertex * len(values) + rank, return_inverse=True)[1]
-    start = vertex.reshape(-1, 3)
+        return None
+    size = np.ptp(corners, axis=0)
+    if size.max() > MAX_SIZE_M or size.min() < MIN_SIZE_M:
+        return None
+    label = np.zeros(len(corners), np.int64)
+    for column in (corners * 10 ** MERGE_DECIMALS[0]).round().astype(np.int64).T:
+        values, rank = np.unique(column, return_inverse=True)  # far quicker than `unique` of rows
+        label = np.unique(label * len(values) + rank, return_inverse=True)[1]
+    first = np.unique(label, return_index=True)[1]
+    order = first.argsort()
+    start = order.argsort()[label].reshape(-1, 3)
+    vertices = corners[first[order]]
+    a, b, c = vertices[start.T]
+    if np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0 < 2.0 * MIN_VOLUME_M3:
+        return None
     end = np.roll(start, -1, axis=1)
-    forward = np.sort(start * vertex.size + end, axis=None)
-    backward = np.sort(end * vertex.size + start, axis=None)
+    forward = np.sort(start * label.size + end, axis=None)
+    backward = np.sort(end * label.size + start, axis=None)
     if (start == end).any() or (forward[1:] == forward[:-1]).any():
-        return False
-    return np.array_equal(forward, backward) and _in_one_piece(start, end)
+        return None
+    return (vertices, start) if np.array_equal(forward, backward) and _in_one_piece(start, end) else None
 
 
 def _in_one_piece(start: npt.NDArray[np.intp], end: npt.NDArray[np.intp]) -> bool:
@@ -163,6 +170,19 @@ def load_mesh(path: Path) -> Mesh:
 
 def solid_of(path: Path, data: bytes) -> Mesh:
     """Return the solid in the content of an STL file; errors as for `load_mesh`, under the name `path`."""
+    found, faces = sound_solid(data) or repaired_solid(path, data)
+    vertices = np.array(found, dtype=np.float64)
+    vertices[:, :2] -= np.round(0.5 * (vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0)), 6)
+    vertices[:, 2] -= vertices[:, 2].min()
+    faces = np.array(faces, dtype=np.int64)
+    digest = hashlib.sha256(vertices.round(9).tobytes() + faces.tobytes()).hexdigest()
+    vertices.setflags(write=False)
+    faces.setflags(write=False)
+    return Mesh(path.stem, vertices, faces, digest)
+
+
+def repaired_solid(path: Path, data: bytes) -> tuple[Array, Faces]:
+    """Return the corners and faces of an STL file that may need repair; errors as for `load_mesh`."""
     data = bounded_stl(path, data)
     try:
         mesh = trimesh.load_mesh(io.BytesIO(data), file_type="stl", process=True)
@@ -176,14 +196,7 @@ def solid_of(path: Path, data: bytes) -> Mesh:
     _close(path, mesh)
     _orient(path, mesh)
     _require_one_body(path, mesh)
-    vertices = np.array(mesh.vertices, dtype=np.float64)
-    vertices[:, :2] -= np.round(0.5 * (vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0)), 6)
-    vertices[:, 2] -= vertices[:, 2].min()
-    faces = np.array(mesh.faces, dtype=np.int64)
-    digest = hashlib.sha256(vertices.round(9).tobytes() + faces.tobytes()).hexdigest()
-    vertices.setflags(write=False)
-    faces.setflags(write=False)
-    return Mesh(path.stem, vertices, faces, digest)
+    return mesh.vertices, mesh.faces
 
 
 UNREADABLE = "is not a readable STL file; export it again as a binary STL"
@@ -262,7 +275,7 @@ def _orient(path: Path, mesh: trimesh.Trimesh) -> None:
         raise BadInput(f"{path}: encloses no volume; its faces lie upon each other")
 
 
-def _runs_forward(faces: npt.NDArray[np.int64], edges: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+def _runs_forward(faces: Faces, edges: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
     """Return (k,) True where face i (k, 3) traverses its edge i (k, 2) in the direction of the edge."""
     following = np.roll(faces, -1, axis=1)
     return np.asarray(((faces == edges[:, :1]) & (following == edges[:, 1:])).any(axis=1))

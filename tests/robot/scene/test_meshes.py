@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from glotouch_bt.robot import BadInput
-from glotouch_bt.robot.scene import is_sound_stl, load_folder, load_mesh
+from glotouch_bt.robot.scene import load_folder, load_mesh, repaired_solid, sound_solid
 
 SIZE = np.array([0.06, 0.04, 0.05])
 
@@ -93,14 +93,23 @@ def test_what_cannot_be_used_is_named(triangles, words: str, tmp_path: Path) -> 
     with pytest.raises(BadInput, match=words) as caught:
         load_mesh(path)
     assert "bad.stl" in str(caught.value)
-    assert not is_sound_stl(path)
+    assert sound_solid(path.read_bytes()) is None
 
 
 @pytest.mark.parametrize("solid", [block(), block((0.3, -0.2, 7.0)), trimesh.creation.icosphere(3, 0.05)])
 def test_the_quick_check_accepts_a_closed_solid(solid: trimesh.Trimesh, tmp_path: Path) -> None:
     path = write(tmp_path / "good.stl", solid.triangles)
-    assert is_sound_stl(path)
+    assert sound_solid(path.read_bytes()) is not None
     load_mesh(path)
+
+
+@pytest.mark.parametrize("solid", [block(), trimesh.creation.icosphere(3, 0.05), trimesh.creation.torus(0.04, 0.012)])
+def test_a_sound_solid_is_read_as_trimesh_reads_it(solid: trimesh.Trimesh, tmp_path: Path) -> None:
+    data = write(tmp_path / "good.stl", solid.triangles).read_bytes()
+    quick = sound_solid(data)
+    assert quick is not None
+    for found, expected in zip(quick, repaired_solid(Path("good.stl"), data), strict=True):
+        assert np.array_equal(found, expected)
 
 
 def test_the_quick_check_leaves_doubtful_solids_to_load_mesh(tmp_path: Path) -> None:
@@ -109,7 +118,7 @@ def test_the_quick_check_leaves_doubtful_solids_to_load_mesh(tmp_path: Path) -> 
     overlapping = np.concatenate([block().triangles, block((0.03, 0.01, 0.03)).triangles])
     for triangles in (turned, overlapping):
         path = write(tmp_path / "doubtful.stl", triangles)
-        assert not is_sound_stl(path)
+        assert sound_solid(path.read_bytes()) is None
         load_mesh(path)
 
 

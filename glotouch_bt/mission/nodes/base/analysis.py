@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
@@ -95,6 +95,10 @@ class DataFlowAnalysis(Protocol):
     def has_unknown(self) -> bool:
         """True if the tree has a node that could not be read."""
 
+    @property
+    def facts(self) -> dict[int, Any]:
+        """What node kinds have found out about each node, by node id, whatever the states it is entered in."""
+
     def run(self, node: NodeSpec, entry: int) -> ExitStates:
         """Return the exit states of a node that is entered in `entry`."""
 
@@ -103,6 +107,9 @@ class DataFlowAnalysis(Protocol):
 
     def unknown(self, entry: int) -> ExitStates:
         """Return the exit states of a node of which nothing is known."""
+
+    def note(self, requirements: Sequence[Requirement], entry: int) -> None:
+        """Note that requirements are looked at in these states; they are always looked at together."""
 
     def look(self, node: NodeSpec, port: str, entry: int) -> Requirement | None:
         """Note that the node reads a port (or resource) in these states; returns the requirement."""
