@@ -11,6 +11,7 @@ because the interleavings of its children are not followed.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from glotouch_bt.mission.check.requirements import Requirements, verdicts
 from glotouch_bt.mission.nodes import (
@@ -42,6 +43,7 @@ class DataFlow:
     Attributes:
         entered: Ids of the nodes that are entered in some state.
         ends: (node id, True: in success) of the nodes that may end so.
+        facts: What node kinds have worked out for a node that holds whatever it is entered in, by node id.
         looked: Set in which each requirement was looked at.
         end: Exit states of the root.
     """
@@ -63,6 +65,7 @@ class DataFlow:
         self.entered: set[int] = set()
         self.ends: set[tuple[int, bool]] = set()
         self.looked: dict[Requirement, int] = {}
+        self.facts: dict[int, Any] = {} if coarse is None else coarse.facts
         self._known: dict[tuple[int, int], ExitStates] = {}
         self.end = self.run(tree, self.sets.start)
 
@@ -111,8 +114,12 @@ class DataFlow:
         """Note that the node reads a port (or resource) in these states; returns the requirement."""
         found = next((r for r in self.requirements[id(node)] if r.port == port), None)
         if found is not None:
-            self.looked[found] = self.sets.union(self.looked.get(found, EMPTY), entry)
+            self.note(found, entry)
         return found
+
+    def note(self, requirement: Requirement, entry: int) -> None:
+        """Note that a requirement is looked at in these states."""
+        self.looked[requirement] = self.sets.union(self.looked.get(requirement, EMPTY), entry)
 
     def where(self, entry: int, variable: int, values: Iterable[int]) -> int:
         """Return the states with such a value, and those that follow an unknown node."""

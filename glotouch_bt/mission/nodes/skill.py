@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import product
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from py_trees.behaviour import Behaviour
 
@@ -41,6 +41,19 @@ def written_kind(node: NodeSpec, port: str, result: str) -> ValueKind:
     element = getattr(declared, "element", None) or object
     value = getattr(declared, f"on_{result}", None)
     return ValueKind(node.skill_type.OUTPUT_PORTS[port].data_type, element, unit_of_name(port), value)
+
+
+class _Ends(NamedTuple):
+    """What a skill may leave, as values of variables: the same in whichever states it is entered.
+
+    Attributes:
+        ports: Of each written port: variable; value after success, failure and preemption; True: failure writes it too.
+        resources: Of each resource: variable; state after success (None: as it was); states after failure; True: it may
+            also be as it was then; states after preemption.
+    """
+
+    ports: tuple[tuple[int, int, int, int, bool], ...]
+    resources: tuple[tuple[int, int | None, tuple[int, ...], bool, tuple[int, ...]], ...]
 
 
 class SkillKind(NodeKind):
@@ -89,34 +102,28 @@ class SkillKind(NodeKind):
 
     def exits(self, flow: DataFlowAnalysis, node: NodeSpec, entry: int) -> ExitStates:
         """Assume that the skill may succeed, fail, and be preempted, in any state that meets its requirements."""
-        skill, sets, variables = _skill_of(node), flow.sets, flow.variables
-        for requirement in flow.requirements[id(node)]:
-            flow.look(node, requirement.port, entry)
-        for requirement in flow.requirements[id(node)]:
+        sets = flow.sets
+        ends = flow.facts.get(id(node))
+        if ends is None:
+            ends = flow.facts[id(node)] = _ends_of(node, flow.variables)
+        requirements = flow.requirements[id(node)]
+        for requirement in requirements:
+            flow.note(requirement, entry)
+        for requirement in requirements:
             entry = flow.meeting(entry, requirement)
         success = failure = running = entry
-        for port, wire in node.writes.items():
-            variable = variables.keys[wire.key]
-            good, bad, part = (variables.value(wire.key, written_kind(node, port, result)) for result in RESULTS)
+        for variable, good, bad, part, always in ends.ports:
             success = sets.assign(success, variable, good)
             running = sets.allow(running, variable, (part,))
-            if _always_writes(skill, port):
-                failure = sets.assign(failure, variable, bad)
+            failure = sets.assign(failure, variable, bad) if always else sets.allow(failure, variable, (bad,))
+        for variable, leaves, after, unchanged, any_time in ends.resources:
+            if unchanged:
+                failure = sets.allow(failure, variable, after)
             else:
-                failure = sets.allow(failure, variable, (bad,))
-        for resource, variable in variables.resources.items():
-            leaves = skill.POSTCONDITIONS.get(resource)
-            after = skill.FAILURE_STATES.get(resource, frozenset({UNCHANGED, leaves or UNCHANGED}))
-            states = [variables.state(resource, s) for s in after - {UNCHANGED}]
-            if UNCHANGED in after:
-                failure = sets.allow(failure, variable, states)
-            else:
-                failure = sets.union(*(sets.assign(failure, variable, s) for s in states))
+                failure = sets.union(*(sets.assign(failure, variable, s) for s in after))
             if leaves is not None:
-                value = variables.state(resource, leaves)
-                success = sets.assign(success, variable, value)
-                states.append(value)
-            running = sets.allow(running, variable, states)
+                success = sets.assign(success, variable, leaves)
+            running = sets.allow(running, variable, any_time)
         return ExitStates(success, failure, running)
 
     def step(
@@ -180,6 +187,22 @@ class SkillKind(NodeKind):
 def _skill_of(node: NodeSpec) -> type[Skill]:
     assert node.skill_type is not None
     return node.skill_type
+
+
+def _ends_of(node: NodeSpec, variables: StateVariables) -> _Ends:
+    """Return what a skill may leave."""
+    skill, ports, resources = _skill_of(node), [], []
+    for port, wire in node.writes.items():
+        good, bad, part = (variables.value(wire.key, written_kind(node, port, result)) for result in RESULTS)
+        ports.append((variables.keys[wire.key], good, bad, part, _always_writes(skill, port)))
+    for resource, variable in variables.resources.items():
+        leaves = skill.POSTCONDITIONS.get(resource)
+        after = skill.FAILURE_STATES.get(resource, frozenset({UNCHANGED, leaves or UNCHANGED}))
+        failed = tuple(variables.state(resource, s) for s in after - {UNCHANGED})
+        state = None if leaves is None else variables.state(resource, leaves)
+        any_time = failed if state is None else (*failed, state)
+        resources.append((variable, state, failed, UNCHANGED in after, any_time))
+    return _Ends(tuple(ports), tuple(resources))
 
 
 def _always_writes(skill: type[Skill], port: str) -> bool:

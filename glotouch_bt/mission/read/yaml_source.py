@@ -8,6 +8,7 @@ from __future__ import annotations
 import codecs
 import math
 import re
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,8 @@ from glotouch_bt.untrusted import read_file
 
 MAX_BYTES = 1_000_000
 """Largest size of a YAML file (bytes)."""
+KEPT_BYTES = 32_000
+"""Largest file whose nodes are kept: a mission reads the same subtree for each of its places. Source: ours."""
 MAX_DEPTH = 60
 """Largest depth of collections inside one another."""
 
@@ -41,6 +44,12 @@ def read_yaml(path: Path, shown: str | None = None) -> Node:
     """
     shown = shown or str(path)
     data = read_file(path, MAX_BYTES, what="a YAML file", links=True, shown=shown)
+    return _kept(data, shown) if len(data) <= KEPT_BYTES else parse_yaml(data, shown)
+
+
+@lru_cache(maxsize=64)
+def _kept(data: bytes, shown: str) -> Node:
+    """Parse a document unless it was parsed lately; nodes cannot be changed."""
     return parse_yaml(data, shown)
 
 

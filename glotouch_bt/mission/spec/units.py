@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import lru_cache
 
 UNITS: dict[str, tuple[str, float]] = {
     "m": ("m", 1.0),
@@ -68,6 +69,7 @@ def split_quantity(text: str) -> tuple[float, str] | None:
     return float(found[1]), found[2].replace("^", "")
 
 
+@lru_cache(maxsize=4096)
 def unit_of_name(name: str) -> str:
     """Return the unit in the suffix of a name (`weight_N`), or empty."""
     return next((unit for suffix, unit in _SUFFIXES if name.endswith(suffix)), "")

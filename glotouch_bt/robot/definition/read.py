@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, get_args
 
@@ -51,16 +52,22 @@ def read_robot(path: Path) -> RobotDescription:
 def _read_file(path: Path) -> RobotFile:
     text = read_file(path, MAX_FILE_BYTES, what="a robot's file", links=True)
     try:
-        data = yaml.safe_load(text)
-        plain = json.dumps(data, default=str)
+        is_mapping, plain = _as_json(text)
     except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError, TypeError) as e:
         raise BadInput(f"{path}: is not YAML ({' '.join(str(e).split())})") from e
-    if not isinstance(data, dict):
+    if not is_mapping:
         raise BadInput(f"{path}: a robot's file must be a mapping with {', '.join(RobotFile.model_fields)}")
     try:
         return RobotFile.model_validate_json(plain, strict=True)
     except ValidationError as e:
         raise BadInput("\n".join(f"{path}: {_in_words(error)}" for error in e.errors())) from e
+
+
+@lru_cache(maxsize=8)
+def _as_json(text: bytes) -> tuple[bool, str]:
+    """Return whether a YAML text is a mapping, and what it holds as JSON."""
+    data = yaml.safe_load(text)
+    return isinstance(data, dict), json.dumps(data, default=str)
 
 
 def _in_words(error: Any) -> str:

@@ -88,6 +88,10 @@ class DataFlowAnalysis(Protocol):
         """Those of each node, by node id."""
 
     @property
+    def facts(self) -> dict[int, Any]:
+        """What a node kind has worked out for a node that holds whatever it is entered in, by node id."""
+
+    @property
     def lenient(self) -> bool:
         """True to go on after a mistake as if the requirement had been met."""
 
@@ -106,6 +110,9 @@ class DataFlowAnalysis(Protocol):
 
     def look(self, node: NodeSpec, port: str, entry: int) -> Requirement | None:
         """Note that the node reads a port (or resource) in these states; returns the requirement."""
+
+    def note(self, requirement: Requirement, entry: int) -> None:
+        """Note that a requirement is looked at in these states."""
 
     def where(self, entry: int, variable: int, values: Iterable[int]) -> int:
         """Return the states with such a value, and those that follow an unknown node."""
