@@ -60,6 +60,8 @@ def post(centre_m: tuple[float, float], radius_m: float, top_m: float) -> Thing:
 
     def force(ball: Array, radius: float) -> Array:
         out = np.zeros_like(ball)
+        if ball[:, 2].min() - radius >= top_m:
+            return out
         offset = ball[:, :2] - centre_m
         away = np.linalg.norm(offset, axis=1)
         side, above = radius_m + radius - away, top_m + radius - ball[:, 2]
