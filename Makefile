@@ -20,7 +20,7 @@ test-integration: $(VENV)/.compiled
 
 # Slow tests, among them whole benches on a small scale: minutes that show little more than the tests of their parts. Then the
 # properties of which `make test` tries fewer examples. Not in .ci/run.
-PROPERTIES = $(shell grep -rl "support.examples import" tests --include="test_*.py")
+PROPERTIES = $(shell grep -rlE "support.examples import|preempt_all_along" tests --include="test_*.py")
 test-studies: $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m study
 	GLOTOUCH_ALL_EXAMPLES=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m "not study" $(PROPERTIES)
