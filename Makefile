@@ -18,13 +18,16 @@ test: $(VENV)/.compiled
 test-integration: $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not study" tests/integration
 
-# Slow tests, among them whole benches on a small scale: minutes that show little more than the tests of their parts. Not in .ci/run.
+# Slow tests, among them whole benches on a small scale: minutes that show little more than the tests of their parts. Then the
+# properties of which `make test` tries fewer examples. Not in .ci/run.
+PROPERTIES = $(shell grep -rlE "support.examples import|preempt_all_along" tests --include="test_*.py")
 test-studies: $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m study
+	GLOTOUCH_ALL_EXAMPLES=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m "not study" $(PROPERTIES)
 
 # The pages in Chromium: needs chromium and chromium-driver (Debian's packages).
 test-browser: $(VENV)/.compiled
-	GLOTOUCH_REQUIRE_BROWSER=1 $(BIN)/python -m pytest tests/browser
+	GLOTOUCH_REQUIRE_BROWSER=1 $(BIN)/python -m pytest -n 2 --dist worksteal tests/browser
 
 check: $(VENV)/.dev
 	$(BIN)/ruff format --check .

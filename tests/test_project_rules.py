@@ -10,6 +10,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,11 @@ MAX_LINES = 400
 
 def sources(*folders: str) -> list[Path]:
     return [p for folder in folders for p in sorted((ROOT / folder).rglob("*.py"))]
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
 
 
 def committed() -> list[Path]:
@@ -63,7 +69,7 @@ def undescribed(tree: ast.Module) -> Iterator[str]:
 
 
 def test_everything_public_is_described() -> None:
-    found = {shown(p): missing for p in sources(*PACKAGES) if (missing := list(undescribed(ast.parse(p.read_text()))))}
+    found = {shown(p): missing for p in sources(*PACKAGES) if (missing := list(undescribed(parsed(p))))}
     assert found == {}
 
 
@@ -97,7 +103,7 @@ def test_no_code_knows_an_object_by_name() -> None:
     found = [
         f"{shown(path)}:{node.lineno}: {node.value!r}"
         for path in sources(*PACKAGES)
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in ast.walk(parsed(path))
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.lower() in names
     ]
     assert found == []
@@ -221,7 +227,7 @@ def dangers(path: Path) -> Iterator[str]:
     """Yield what in a source file could run foreign code, or open a file to others."""
     name = shown(path)
     allowed = TEST_CALLS if name.startswith("tests/") else set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import | ast.ImportFrom):
             modules = [node.module or ""] if isinstance(node, ast.ImportFrom) else [a.name for a in node.names]
             yield from (f"{name}:{node.lineno}: {m}" for m in modules if m.partition(".")[0] in CODE_IN_DATA)

@@ -110,7 +110,7 @@ def workers_of(parent: subprocess.Popen[str]) -> list[int]:
     return [int(parent.stdout.readline().split()[1]) for _ in range(2)]
 
 
-@pytest.mark.parametrize("times", [1, 5])
+@pytest.mark.parametrize("times", [pytest.param(1, marks=pytest.mark.study), 5])
 def test_ctrl_c_ends_all_without_a_traceback(parent: subprocess.Popen[str], times: int) -> None:
     """Nothing that waits begins: no third worker is heard of."""
     with parent:

@@ -19,6 +19,7 @@ holder:
   pose_B_grasp: {position_m: [0.45, -0.32, -0.06]}
 objects: {folder: good}
 """
+SEEK = Path(__file__).parents[1] / "support" / "seek.yaml"
 TREE = "mission: m\nworld: container_five\ntree:\n"
 
 
@@ -51,6 +52,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for above, name in zip("abcdefgh", "bcdefghi", strict=True):
         bomb += f"{name}: &{name} [{', '.join([f'*{above}'] * 9)}]\n"
     for name, text in {
+        "seek": SEEK.read_text(),
         "anchor": TREE + "  - &again tool_pickup\n  - *again\n",
         "bomb": bomb + "world: container_five\ntree: lift\n",
         "merge": TREE + "  - grasp: {<<: {force_N: 3}}\n",
@@ -79,16 +81,16 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 CASES = [
     # object files
-    ("run retrieve --set target=gone.stl", "--set target: gone.stl: no such STL file"),
-    ("run retrieve --set target=open/a.stl", "open/a.stl: is not watertight"),
-    ("run retrieve --set target=mm/a.stl", "mm/a.stl: is 60 m large; STL files must be in METRES"),
-    ("run retrieve --set target=text/a.stl", "text/a.stl: "),
-    ("run retrieve --set target=empty/a.stl", "empty/a.stl: "),
-    ("run retrieve --set target=thin/a.stl", "thin/a.stl: "),
-    ("run retrieve --set target=", "--set target: unknown object"),
-    ("run retrieve --objects open --set target=a", "open/a.stl: is not watertight"),
-    ("run retrieve --objects mm --set target=a", "(in millimetres? then scale it by 0.001 to 0.06 m)"),
-    ("run retrieve --objects good --set target=b", "unknown object (in good) 'b' (valid: a)"),
+    ("run seek.yaml --set target=gone.stl", "--set target: gone.stl: no such STL file"),
+    ("run seek.yaml --set target=open/a.stl", "open/a.stl: is not watertight"),
+    ("run seek.yaml --set target=mm/a.stl", "mm/a.stl: is 60 m large; STL files must be in METRES"),
+    ("run seek.yaml --set target=text/a.stl", "text/a.stl: "),
+    ("run seek.yaml --set target=empty/a.stl", "empty/a.stl: "),
+    ("run seek.yaml --set target=thin/a.stl", "thin/a.stl: "),
+    ("run seek.yaml --set target=", "--set target: unknown object"),
+    ("run seek.yaml --objects open --set target=a", "open/a.stl: is not watertight"),
+    ("run seek.yaml --objects mm --set target=a", "(in millimetres? then scale it by 0.001 to 0.06 m)"),
+    ("run seek.yaml --objects good --set target=b", "unknown object (in good) 'b' (valid: a)"),
     ("run survey --objects open", "open/a.stl: is not watertight"),
     ("run survey --objects mm", "mm/a.stl: is 60 m large"),
     ("run survey --objects none", "--objects none: is not a folder with .stl files in it"),

@@ -77,15 +77,15 @@ BAD = [
     (["run", "gone/m.yaml"], "no such mission file"),
     (["run", "retrieve", "--set", "target"], "must be NAME=VALUE"),
     (["run", "retrieve", "--set", "target=wukog"], "did you mean 'wukong'"),
-    (["run", "retrieve", "--set", "expected_objects=0"], "must be in [1, 20]"),
+    (["run", "survey", "--set", "expected_objects=0"], "must be in [1, 20]"),
     (["run", "retrieve", "--set", "target=apple", "--set", "target=train"], "given twice"),
-    (["run", "retrieve", "--backend", "mujco"], "unknown backend 'mujco'"),
-    (["run", "retrieve", "--conditions", "nominl"], "did you mean 'nominal'"),
-    (["run", "retrieve", "--conditions", "nominal+gel_blur_mm=1.5"], "did you mean 'gel_blur_m'"),
-    (["run", "retrieve", "--set-condition", "gel_blr_m=0.001"], "did you mean 'gel_blur_m'"),
-    (["run", "retrieve", "--set-condition", "gel_blur_m"], "--set-condition gel_blur_m: must be NAME=VALUE"),
-    (["run", "retrieve", "--seed", "-1"], "--seed -1"),
-    (["run", "retrieve", "--objects", "gone"], "--objects gone"),
+    (["run", "survey", "--backend", "mujco"], "unknown backend 'mujco'"),
+    (["run", "survey", "--conditions", "nominl"], "did you mean 'nominal'"),
+    (["run", "survey", "--conditions", "nominal+gel_blur_mm=1.5"], "did you mean 'gel_blur_m'"),
+    (["run", "survey", "--set-condition", "gel_blr_m=0.001"], "did you mean 'gel_blur_m'"),
+    (["run", "survey", "--set-condition", "gel_blur_m"], "--set-condition gel_blur_m: must be NAME=VALUE"),
+    (["run", "survey", "--seed", "-1"], "--seed -1"),
+    (["run", "survey", "--objects", "gone"], "--objects gone"),
     (["check", "nothing"], "unknown mission"),
     (["skills", "squeez"], "did you mean 'squeeze'"),
     (["tree", "nothing"], "unknown mission"),
@@ -116,7 +116,7 @@ def test_bad_input_is_exit_2_with_one_message(
 def test_an_unwritable_out_moves_nothing(command: CliRunner, tmp_path: Path) -> None:
     taken = tmp_path / "file"
     taken.write_text("x")
-    done = command.invoke(cli.app, ["run", "retrieve", "--out", str(taken / "run")])
+    done = command.invoke(cli.app, ["run", "survey", "--out", str(taken / "run")])
     assert done.exit_code == 2
     assert "cannot be written here" in done.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
@@ -150,7 +150,7 @@ def test_tree_draws_text_and_svg(command: CliRunner, tmp_path: Path) -> None:
     import xml.etree.ElementTree as ET
 
     out = tmp_path / "tree.svg"
-    assert command.invoke(cli.app, ["tree", "retrieve", "--format", "svg", "--out", str(out)]).exit_code == 0
+    assert command.invoke(cli.app, ["tree", "survey", "--format", "svg", "--out", str(out)]).exit_code == 0
     assert ET.parse(out).getroot().tag.endswith("svg")
 
 

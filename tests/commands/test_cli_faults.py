@@ -42,7 +42,7 @@ def test_the_catalogue_as_json_and_as_a_table() -> None:
 def test_a_bad_plan_is_one_message_and_nothing_is_left(tmp_path: Path, plan: str, message: str) -> None:
     file, out = tmp_path / "plan.yaml", tmp_path / "run"
     file.write_text(plan)
-    ended = runner.invoke(app, ["run", "retrieve", "--backend", "fake", "--faults", str(file), "--out", str(out)])
+    ended = runner.invoke(app, ["run", "calibrate", "--backend", "fake", "--faults", str(file), "--out", str(out)])
     assert ended.exit_code == 2
     assert message in ended.stderr
     assert "Traceback" not in ended.stderr
@@ -52,7 +52,7 @@ def test_a_bad_plan_is_one_message_and_nothing_is_left(tmp_path: Path, plan: str
 def test_a_faulted_run_says_what_became_of_its_faults(tmp_path: Path) -> None:
     file, out = tmp_path / "plan.yaml", tmp_path / "run"
     file.write_text("faults: f\nplan:\n  - {fault: exception, when: {node: tool_pickup, after_s: 0.2}}\n")
-    ended = runner.invoke(app, ["run", "retrieve", "--backend", "fake", "--faults", str(file), "--out", str(out)])
+    ended = runner.invoke(app, ["run", "calibrate", "--backend", "fake", "--faults", str(file), "--out", str(out)])
     assert ended.exit_code == 3
     assert "injected exception" in ended.stderr
     result = json.loads((out / "result.json").read_text())

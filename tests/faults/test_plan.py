@@ -25,6 +25,7 @@ from glotouch_bt.mission.read.yaml_source import parse_yaml
 from glotouch_bt.mission.spec.findings import MissionFaults
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.fake import FakeRobot
+from tests.support.examples import examples
 
 BAD = """\
 faults: everything
@@ -138,7 +139,7 @@ tree = st.recursive(
 )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=examples(150, 400), deadline=None)
 @given(
     st.one_of(
         tree,

@@ -91,12 +91,17 @@ def test_an_apple_is_retrieved(tmp_path: Path) -> None:
     check_folder(done)
 
 
-def test_the_same_survey_twice_is_the_same_to_the_byte(tmp_path: Path) -> None:
-    request = {"seed": 3, "settings": {"expected_objects": "1"}}
-    runs = [launch(RunRequest("survey", out=tmp_path / name, **request)) for name in ("one", "two")]
+@pytest.mark.parametrize(
+    ("mission", "settings", "found"),
+    [("calibrate", {}, 0), pytest.param("survey", {"expected_objects": "1"}, 1, marks=pytest.mark.study)],
+)
+def test_the_same_mission_twice_is_the_same_to_the_byte(
+    mission: str, settings: dict[str, str], found: int, tmp_path: Path
+) -> None:
+    runs = [launch(RunRequest(mission, seed=3, settings=settings, out=tmp_path / name)) for name in ("one", "two")]
     first, second = (check_result(r) for r in runs)
     assert first["status"] == "success", first["reasons"]
-    assert len(first["candidates"]) == 1
+    assert len(first["candidates"]) == found
     assert first["peak_force_N"] < Limits().hard_force_N
     for result in (first, second):
         for key in [k for k in result if k.startswith("wall_")]:

@@ -80,7 +80,7 @@ def test_an_object_that_is_dropped_in_the_lift_is_not_reported_as_lifted(faulted
     assert (result["status"], result["reason_chain"][-1]["code"]) == ("failure", "lost")
 
 
-@pytest.mark.parametrize(("seed", "aside_mm"), [(53657, 4.3), (53749, 5.4)])
+@pytest.mark.parametrize(("seed", "aside_mm"), [pytest.param(53657, 4.3, marks=pytest.mark.study), (53749, 5.4)])
 def test_a_tilted_shaft_passes_through_its_slot_both_ways(tmp_path: Path, seed: int, aside_mm: float) -> None:
     """The slot leaves the ball 2.5 mm. The hand gives way on the way out, and stands aside on the way in."""
     text = (

@@ -275,6 +275,7 @@ def test_a_dropped_probe_is_noticed_and_nothing_is_found_without_it(run: Run, ma
     assert done.outcome.end_s < 80.0, "no search without a probe"
 
 
+@pytest.mark.study
 def test_a_probe_dropped_later_leaves_what_was_found(run: Run) -> None:
     faults = (
         "  - {fault: grip_drop, with: {duration_s: 3}, when: {node: guarded_sweep, visit: 2, after_s: 2}, for: ever}"
@@ -285,6 +286,7 @@ def test_a_probe_dropped_later_leaves_what_was_found(run: Run) -> None:
     assert done.outcome.summary.candidates
 
 
+@pytest.mark.study
 def test_a_probe_that_slipped_in_the_jaws_is_put_back_and_taken_anew(run: Run) -> None:
     """The jaws open a little over the floor and close again on the probe, which has sunk by more than a centimetre."""
     faults = """
@@ -299,6 +301,7 @@ def test_a_probe_that_slipped_in_the_jaws_is_put_back_and_taken_anew(run: Run) -
     assert done.referee.probe_in_holder()
 
 
+@pytest.mark.study
 def test_jaws_that_report_wrongly_do_not_end_a_search_with_a_held_probe(run: Run) -> None:
     faults = "  - {fault: grip_misreport, with: {aperture_m: 6 mm}, when: {node: guarded_sweep, after_s: 2}, for: ever}"
     done = run(EXPLORE.replace("EXPECTED", "1"), faults, {"block": (0.02, -0.06, 0.0)}, {"block": WIDE})

@@ -18,7 +18,7 @@ from glotouch_bt.campaign import Campaign, OnRow, Row, Shard, Trial, crashed, ru
 
 COLUMNS = ("number", "digest", "value", "status", "cause")
 Kind = str
-"""Behaviour of a trial: "" works; "raise", "kill", "leave", "hang", "full" fail; "kill once", "full once" recover."""
+"""Behaviour of a trial: "" works; "raise", "kill", "hang", "full" fail; "kill once", "full once" recover."""
 
 
 def short_campaign(out: Path, *, resume: bool = False, shard: Shard | None = None, **changes: Any) -> Campaign:
@@ -55,8 +55,6 @@ def act(kind: Kind) -> None:
         raise KeyError("a bug")
     if kind == "kill":
         os.kill(os.getpid(), signal.SIGKILL)
-    if kind == "leave":
-        os._exit(3)
     if kind == "hang":
         threading.Event().wait()
     if kind == "full":

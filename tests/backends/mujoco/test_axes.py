@@ -37,13 +37,12 @@ def world(world: World, tmp_path_factory: pytest.TempPathFactory) -> World:
 
 
 def squeeze(robot: MujocoRobot, drive: Drive) -> list[Observation]:
-    """Squeeze the block, lift it a little, put it down, and open again."""
+    """Squeeze the block and open again."""
     driver = drive(robot)
     driver.jaws(0.070, time_s=0.3)
     driver.line((0.63, 0.08, -0.165), speed_m_s=0.4)
     for target in (GripperTarget(0.020, 0.1, 10.0), GripperTarget(0.070, 0.1, 10.0)):
         driver.wait(0.7, Command(gripper=target, tactile=True))
-    driver.line((0.63, 0.08, 0.0), speed_m_s=0.4)
     observations: list[Observation] = driver.observations
     return observations
 

@@ -26,10 +26,9 @@ def test_poisson_interval_against_the_tables():
     assert (five["lo"], five["hi"], five["rate"]) == pytest.approx((1.623 / 2, 11.668 / 2, 2.5), abs=1e-3)
 
 
-@pytest.mark.parametrize("condition", ["nominal", "harsh"])
-def test_free_motion_is_silent_because_the_inertia_is_taken_out(condition):
-    """Two minutes of each kind of move; downwards it would trip on every stop without."""
-    conditions = load_conditions(condition)
+def test_free_motion_is_silent_because_the_inertia_is_taken_out():
+    """Two minutes of each kind of move with the strongest noise; downwards it would trip on every stop without."""
+    conditions = load_conditions("harsh")
     quiet = false_alarms(HAND, conditions, SEEDS, hours=0.03)
     assert [r["count"] for r in quiet.values()] == [0, 0, 0]
     loud = false_alarms(HAND, conditions, range(2), hours=0.01, compensate=False)
@@ -44,7 +43,6 @@ def test_what_force_is_found(kind, push):
     assert found_share(HAND, nominal, kind, push, 0.06, SEEDS)["rate"] == 0.0
     assert found_share(HAND, nominal, kind, push, 0.2, SEEDS)["rate"] == 1.0
     assert found_share(HAND, harsh, kind, push, 0.4 if kind == "down" else 0.2, SEEDS)["rate"] == 1.0
-    assert found_share(HAND, harsh, kind, push, 0.6, SEEDS)["rate"] == 1.0
 
 
 @pytest.mark.parametrize("kind", ["sweep", "step"])

@@ -37,6 +37,12 @@ def quick(made_up, monkeypatch):
     monkeypatch.setattr(bench, "timing_task", lambda *_: {"new_stl_s": 0.5, "pair_ms": {"likelihood": 7.25}})
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """No plots, which take seconds; the recorded dataset's and the empty one's are drawn."""
+    monkeypatch.setattr(bench, "plot_all", lambda *_: None)
+
+
 def campaign(tmp_path, **changes):
     given = {
         "seeds": (3, 4), "conditions": "nominal", "objects": None, "strangers": tmp_path, "dataset": None,
@@ -78,7 +84,7 @@ def test_a_recorded_dataset(quick, monkeypatch, tmp_path):
         assert len(list(csv.DictReader(f))) == 6 * (5 + 5 + 1 + 6)
 
 
-def test_layouts_that_cannot_be_acquired_are_rows(quick, monkeypatch, tmp_path):
+def test_layouts_that_cannot_be_acquired_are_rows(quick, undrawn, monkeypatch, tmp_path):
     monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
     monkeypatch.setattr(MatchCampaign, "layout_request", lambda self, seed: seed)
 
@@ -97,7 +103,7 @@ def test_layouts_that_cannot_be_acquired_are_rows(quick, monkeypatch, tmp_path):
     assert (tmp_path / "o" / "touchsets" / "s0003-c2.npz").is_file()
 
 
-def test_touches_without_a_robot_are_written_like_acquired_ones(quick, monkeypatch, tmp_path):
+def test_touches_without_a_robot_are_written_like_acquired_ones(quick, undrawn, monkeypatch, tmp_path):
     monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
     monkeypatch.setattr(bench, "sampled_layout", lambda backend, world, conditions, seed, images: a_layout(seed))
     with ThreadPoolExecutor(1) as pool:
@@ -172,7 +178,7 @@ def test_bad_input_is_exit_2_before_anything_is_written(words, message, command,
 
 
 @pytest.mark.parametrize("as_json", [False, True])
-def test_the_command(as_json, command, quick, monkeypatch, tmp_path):
+def test_the_command(as_json, command, quick, undrawn, monkeypatch, tmp_path):
     monkeypatch.setattr(MatchCampaign, "check", lambda self: None)
     (tmp_path / "there").mkdir()
     write_layout(tmp_path / "set", a_layout(3))

@@ -6,6 +6,8 @@ import os
 import signal
 from collections.abc import Callable, Mapping
 
+import pytest
+
 from glotouch_backends.flexiv_xense.client.backend import FlexivXenseBackend
 from glotouch_backends.flexiv_xense.client.robot import FlexivXenseRobot
 from glotouch_backends.flexiv_xense.driver.messages import RefereeAnswer, RefereeRequest
@@ -13,6 +15,13 @@ from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.conformance import RobotConformance, Wall
 from glotouch_bt.robot import Conditions, Robot
 from tests.conformance.conformance_world import OPTIONS, WORLD, floor
+from tests.support.forked_driver import fork_drivers
+
+
+@pytest.fixture(autouse=True)
+def forked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fork the driver's process: a start from nothing, thirty times, would take most of these tests' time."""
+    fork_drivers(monkeypatch.setattr)
 
 
 def disturb(name: str) -> Callable[[Robot], None]:

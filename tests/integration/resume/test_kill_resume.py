@@ -24,6 +24,7 @@ tree:
 """
 
 
+@pytest.mark.study
 def test_a_killed_run_is_compared_with_its_twin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install_fakes(monkeypatch.setattr)
     (tmp_path / "m.yaml").write_text(MISSION)

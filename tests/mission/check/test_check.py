@@ -15,6 +15,7 @@ from glotouch_bt.mission.load import load_mission
 from glotouch_bt.mission.read.library import shipped_root
 from glotouch_bt.mission.spec.findings import MissionFaults
 from glotouch_bt.robot import BadInput
+from tests.support.examples import examples
 
 HEAD = "mission: m\nworld: container_five\n"
 # (name, whole text, [(line, column, code, words)])
@@ -201,7 +202,7 @@ TREES = st.recursive(
 )
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(100, 300), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(tree=TREES, parameters=TREES)
 def test_any_tree_is_loaded_or_refused(tree: Any, parameters: Any, tmp_path: Path, registry: dict[str, Any]) -> None:
     """Whatever stands there: a mission or a BadInput, never another error."""

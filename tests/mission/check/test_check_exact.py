@@ -33,6 +33,7 @@ from glotouch_bt.mission.read.yaml_source import parse_yaml
 from glotouch_bt.mission.spec import Findings, NodeSpec, number_names
 from glotouch_bt.mission.tree.build import build_tree
 from glotouch_bt.skill import UNCHANGED, Context, In, Out, Skill, SkillFailed, SkillRun
+from tests.support.examples import examples
 
 pytestmark = pytest.mark.usefixtures("quorum")
 MAX_RUNS, MAX_STEPS, ITEMS = 600, 16, 2
@@ -319,7 +320,7 @@ def by_sets(spec: NodeSpec) -> tuple[DataFlow, set[tuple[str, str, str]], set[tu
     return flow, wrong, ends
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(120, 400), deadline=None, suppress_health_check=list(HealthCheck))
 @given(tree=TREES)
 @example(tree={"fail": {"do": {"selector": [{"timeout": {"seconds": 1.0, "do": "a"}}, "a"]}}})
 def test_what_is_found_is_what_can_happen(tree: Any) -> None:
@@ -336,7 +337,7 @@ def test_what_is_found_is_what_can_happen(tree: Any) -> None:
         assert possible == ends
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(120, 400), deadline=None, suppress_health_check=list(HealthCheck))
 @given(tree=TREES)
 def test_the_path_shown_is_the_shortest_there_is(tree: Any) -> None:
     """It ends at the node that looks, after as few outcomes of leaves as any run that was ticked."""
@@ -358,7 +359,7 @@ def test_the_path_shown_is_the_shortest_there_is(tree: Any) -> None:
                 assert len(path) - 1 == seen[requirement.node.name, requirement.port, state], path
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(120, 400), deadline=None, suppress_health_check=list(HealthCheck))
 @given(tree=TREES)
 def test_variables_that_decide_nothing_need_not_be_followed(tree: Any) -> None:
     """The same nodes are entered and end alike, and a tree has findings with all variables only if it has some here."""

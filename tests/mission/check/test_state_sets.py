@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glotouch_bt.mission.nodes.base import EMPTY, StateSets
+from tests.support.examples import examples
 
 
 def holds(algebra: StateSets, given: int, state: tuple[int, ...]) -> bool:
@@ -16,7 +17,7 @@ def holds(algebra: StateSets, given: int, state: tuple[int, ...]) -> bool:
     return given != EMPTY
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(80, 200), deadline=None)
 @given(
     sizes=st.lists(st.integers(2, 3), min_size=1, max_size=4),
     steps=st.lists(st.tuples(st.integers(0, 4), st.integers(0, 3), st.integers(0, 7), st.integers(0, 9)), max_size=12),

@@ -34,6 +34,7 @@ from glotouch_bt.robot import HOLD, BadInput, Observation
 from glotouch_bt.skill import In, Out, Skill, SkillFailed, SkillParams, SkillRun
 from tests.mission.conftest import ClockRobot
 from tests.mission.nodes.quorum import QuorumSettings
+from tests.support.examples import examples
 
 pytestmark = pytest.mark.usefixtures("quorum")
 HERE = Place("m.yaml", 1, 1)
@@ -238,7 +239,7 @@ def ending(outcome: Outcome) -> Any:
     return outcome.status, [f.as_dict() for f in outcome.chain], outcome.start_s, outcome.end_s, outcome.ticks
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(20, 60), deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.recursive(leaves, trees, max_leaves=8).flatmap(lambda t: st.tuples(st.just(t), st.integers(0, 50))))
 def test_a_resumed_tree_goes_on_as_the_one_that_was_not_broken_off(case: tuple[NodeSpec, int]) -> None:
     """Same status changes, ports, reasons and times, tick by tick; and the checkpoints it writes are the same, too."""

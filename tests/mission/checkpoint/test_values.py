@@ -20,6 +20,7 @@ from glotouch_bt.mission.checkpoint.codec import Encoder, NotEncodable, decode, 
 from glotouch_bt.perception.touch import Contact, Contour
 from glotouch_bt.robot import BadInput, GripperState, Pose
 from glotouch_bt.skill import Reason
+from tests.support.examples import examples
 
 
 def same(a: Any, b: Any) -> bool:
@@ -72,20 +73,20 @@ values = st.recursive(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(100, 300), deadline=None)
 @given(values)
 def test_what_may_be_kept_comes_back_to_the_bit(value: Any) -> None:
     assert same(decode(encode(value)), value)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(100, 300), deadline=None)
 @given(st.binary(max_size=200))
 def test_no_bytes_do_more_than_be_refused(data: bytes) -> None:
     with contextlib.suppress(BadInput):
         decode(data)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(80, 200), deadline=None)
 @given(values, st.integers(0, 10_000), st.integers(0, 255))
 def test_a_damaged_value_is_read_or_refused(value: Any, at: int, byte: int) -> None:
     data = bytearray(encode(value))

@@ -25,6 +25,7 @@ from glotouch_bt.robot.fake import FakeRobot
 from glotouch_bt.runs.operator import operated
 from glotouch_bt.skill import Skill, SkillFailed, SkillRun
 from glotouch_bt.validation.pause import EveryNthTick
+from tests.support.examples import examples
 
 
 class Events(NullRecord):
@@ -275,7 +276,7 @@ def on_fake(load: Callable[..., Any], registry: dict[str, type[Skill]]) -> Itera
         registry.pop(name)
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(8, 20), deadline=None, suppress_health_check=list(HealthCheck))
 @given(every=st.integers(3, 120), pause_s=st.floats(0.01, 0.7))
 def test_a_skill_never_notices(on_fake: Any, every: int, pause_s: float) -> None:
     robot = FakeRobot()

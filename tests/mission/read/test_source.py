@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from glotouch_bt.mission.read.yaml_source import MAX_DEPTH, parse_yaml, read_yaml
 from glotouch_bt.mission.spec.source import Map, Place, Scalar, plain
 from glotouch_bt.robot import BadInput
+from tests.support.examples import examples
 
 
 def test_places_count_from_one() -> None:
@@ -106,7 +107,7 @@ VALUES = st.recursive(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(60, 150), deadline=None)
 @given(VALUES)
 def test_agrees_with_safe_load(value: object) -> None:
     """What PyYAML writes, both readers read alike (keys that PyYAML would not read as text are refused)."""
@@ -118,7 +119,7 @@ def test_agrees_with_safe_load(value: object) -> None:
             raise
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(100, 300), deadline=None)
 @given(st.text("ab:-[]{}&*!|>'\"#%@, \n\t01.~?$<", max_size=60) | st.binary(max_size=40))
 def test_any_text_is_read_or_refused(text: str | bytes) -> None:
     try:

@@ -43,8 +43,7 @@ def total(ranking) -> float:
     return sum(m.probability for m in ranking.matches) + ranking.p_absent
 
 
-@pytest.mark.parametrize("disturbance", [NOMINAL, HARSH], ids=["nominal", "harsh"])
-@pytest.mark.parametrize("seed", [11, 12])
+@pytest.mark.parametrize(("disturbance", "seed"), [(NOMINAL, 11), (HARSH, 12)], ids=["nominal", "harsh"])
 def test_each_target_finds_itself(meshes, disturbance, seed: int) -> None:
     sets = [touched(m, disturbance, 100 * seed + i, i)[0] for i, m in enumerate(meshes)]
     for i, mesh in enumerate(meshes):

@@ -39,6 +39,7 @@ from tests.robot.supervision.supervised import (
     supervised,
     with_part,
 )
+from tests.support.examples import examples
 
 GUARDS_PAGE = Path(__file__).parents[3] / "docs/explanation/supervision.md"
 
@@ -279,7 +280,7 @@ def test_device__errors_are_recorded_and_raised(error: BackendError, guard: str)
         robot.cycle(HOLD)
 
 
-@settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(4, 10), deadline=None, suppress_health_check=list(HealthCheck))
 @given(seed=st.integers(0, 2**32 - 1), noise=st.floats(0.0, 0.25))
 def test_valid_readings_and_commands_pass_without_a_finding(seed: int, noise: float) -> None:
     """Random walks within half of the limits, with noise."""
