@@ -9,10 +9,11 @@ __all__ = ["retrieve"]
 
 DECIDED = ok(decided=True, lacks_space=False)
 REFUSED = fails("not_recognised")
+KEPT = {"start_over": fails("consistent")}
 
 
 def scheduled(retrieve: Run, script, *measured: int, **settings):
-    return retrieve({"next_probe*": measures(*measured), **script}, mission="retrieve", **settings)
+    return retrieve({"next_probe*": measures(*measured)} | KEPT | script, mission="retrieve", **settings)
 
 
 def test_it_goes_through_its_stages_in_order(retrieve: Run) -> None:
@@ -119,6 +120,26 @@ def test_a_hand_that_cannot_be_cleared_then_touches_nothing(retrieve: Run) -> No
     assert not run.calls_of(last + "touch_next*")
 
 
+def test_a_map_that_contradicts_itself_is_forgotten_and_all_begins_again(retrieve: Run) -> None:
+    refused = {f"match{n}": REFUSED for n in (" 2", " 3", " 4", " 5")} | {"match": [REFUSED, ok()]}
+    run = scheduled(retrieve, {**refused, "touch_next*": DECIDED, "start_over": ok(candidates=())})
+    assert run.succeeded
+    (again,) = run.calls_of("start_over")
+    assert again.params.expected_objects == 5
+    at = run.order.index("start_over")
+    assert run.calls[at - 1].skill == "stow"
+    assert run.order[at + 1 : at + 5] == ["tool_pickup", "tool_calibrate", "tool_check", "wrist_check"]
+    assert run.ran("match") == 2
+
+
+def test_it_begins_again_only_once(retrieve: Run) -> None:
+    """The second time, `start_over` says that it forgot everything before."""
+    script = {"match*": REFUSED, "touch_next*": DECIDED, "start_over": [ok(), fails("consistent")]}
+    run = scheduled(retrieve, script)
+    assert safely(run, "not_recognised")
+    assert (run.ran("match"), run.ran("start_over")) == (2, 2)
+
+
 # --- space for the fingers -------------------------------------------------------------------------------------------
 
 CRAMPED = ok(decided=True, cramped=(0,), lacks_space=True)
@@ -161,11 +182,11 @@ def test_if_no_space_can_be_made_the_first_reason_is_kept(retrieve: Run) -> None
 
 def test_an_object_that_can_be_set_down_nowhere_ends_the_mission_in_the_hand(retrieve: Run) -> None:
     held = {"nudge": fails("no_push"), "set_down 2": fails("no_place"), "put_back 7": fails("in_the_way")}
-    held |= {"*/end safely/stow*": fails("object_held")}
+    held |= {"*/begin again/stow*": fails("object_held"), "*/end safely/stow*": fails("object_held")}
     run = scheduled(retrieve, {"match*": REFUSED, "touch_next*": CRAMPED} | held)
     assert run.status == "failure"
     assert (run.ran("nudge"), run.ran("set_down 2")) == (1, 1)
-    assert [c.skill for c in run.calls[run.order.index("set_down 2") + 1 :]] == ["put_back", "stow"]
+    assert [c.skill for c in run.calls[run.order.index("set_down 2") + 1 :]] == ["put_back", "stow", "stow"]
 
 
 def test_where_the_hand_fits_at_no_grasp_space_is_made_and_the_target_is_recognised_again(retrieve: Run) -> None:

@@ -6,6 +6,7 @@ from glotouch_bt.perception.search.candidates import (
     HALF_QUALITY_SD_M,
     admit,
     lost_among,
+    overlap_depth_m,
     quality,
     refined,
 )

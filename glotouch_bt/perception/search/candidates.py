@@ -207,7 +207,7 @@ def separated(admitted: Admitted, radius_m: float, exclusion_m: float) -> Admitt
     tried: set[frozenset[frozenset[int]]] = set()
     while radius_m > 0.0:
         pairs = (p for p in combinations(admitted.candidates, 2) if _groups(*p) not in tried)
-        deepest = max(((_overlap_m(*p), p) for p in pairs), key=lambda found: found[0], default=None)
+        deepest = max(((overlap_depth_m(*p), p) for p in pairs), key=lambda found: found[0], default=None)
         if deepest is None or deepest[0] < OVERLAP_M:
             break
         one, other = deepest[1]
@@ -227,7 +227,7 @@ def _groups(a: Candidate, b: Candidate) -> frozenset[frozenset[int]]:
     return frozenset(frozenset(map(id, candidate.contacts)) for candidate in (a, b))
 
 
-def _overlap_m(a: Candidate, b: Candidate) -> float:
+def overlap_depth_m(a: Candidate, b: Candidate) -> float:
     """Return how deep the outline of one candidate reaches into the other's; negative if they are apart."""
     pairs = ((a.contour, b.contour), (b.contour, a.contour))
     return -min(float(signed_distance(one, other.outline_K_m()).min()) for one, other in pairs)
@@ -275,7 +275,7 @@ def _occupied(candidate: Candidate) -> Contour:
 def _next_index(belief: SearchMap, candidates: Iterable[Candidate]) -> int:
     """Return an index that no candidate has, and no traced object whose candidate was left out."""
     traced = (e.index for e in belief.exclusions if e.index is not None)
-    return max(chain((c.index for c in candidates), traced), default=-1) + 1
+    return max(chain((c.index for c in candidates), traced), default=belief.first_index - 1) + 1
 
 
 def _admitted(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -19,7 +20,7 @@ from glotouch_bt.perception.search.remaining import (
     discs,
     remaining,
 )
-from glotouch_bt.perception.touch import Contact, Contour, signed_distance
+from glotouch_bt.perception.touch import Candidate, Contact, Contour, signed_distance
 from glotouch_bt.robot import Array, ParamError, frozen_array
 
 PATH_STEP_M = 0.002
@@ -94,6 +95,7 @@ class SearchMap:
         unprobed: As many objects are traced as are known, but in doubt, and candidates that may be two bodies are still
             to be probed.
         probed: Indices of the candidates that were probed for that; each is probed once.
+        first_index: Index of the first candidate; smaller ones were given to candidates that were forgotten.
     """
 
     half_extent_m: Array
@@ -107,6 +109,7 @@ class SearchMap:
     doubt: float = 0.0
     unprobed: bool = False
     probed: tuple[int, ...] = ()
+    first_index: int = 0
 
     @classmethod
     def blank(
@@ -131,6 +134,17 @@ class SearchMap:
         none = np.zeros((0, 2))
         none.setflags(write=False)
         return cls(half, expected, none, (), none, left_below=left_below, interior_m=interior_m)
+
+    def forgotten(self, expected: int | None, candidates: Iterable[Candidate]) -> SearchMap:
+        """Return a map without any exploration, whose candidates get other indices than the present ones.
+
+        Args:
+            expected: Number of objects to find; None: unknown.
+            candidates: The candidates that are forgotten.
+        """
+        indices = (*(c.index for c in candidates), *(e.index for e in self.exclusions if e.index is not None))
+        blank = SearchMap.blank(self.half_extent_m, expected, self.left_below, self.interior_m)
+        return replace(blank, first_index=max(indices, default=self.first_index - 1) + 1)
 
     def with_path(self, points_K_m: npt.ArrayLike) -> SearchMap:
         """Add an executed, connected path (n, 2 or 3), resampled to 2 mm."""
