@@ -66,7 +66,14 @@ class StartOver(Skill):
         self.candidates, self.touchsets, self.doubtful = (), (), ()
         self.times_forgotten = times + 1
         self.context.arm.felt.forget()
-        self.event("start_over", why=why, candidates=tuple(c.index for c in candidates))
+        indices = tuple(c.index for c in candidates)
+        self.event("start_over", why=why, candidates=indices)
+        self.report(
+            "Begun again",
+            "What was found contradicted itself. It was forgotten, and the search began again.",
+            ("forgotten candidates", "why"),
+            ((", ".join(map(str, indices)), why),),
+        )
 
 
 def _contradiction(candidates: tuple[Candidate, ...]) -> str:

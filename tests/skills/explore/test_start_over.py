@@ -43,6 +43,8 @@ def test_a_map_that_contradicts_itself_is_forgotten(bench, found, apart_m: float
     assert (len(skill.map.path_K_m), skill.map.exclusions, len(skill.map.dropped)) == (0, (), 0)
     assert skill.map.first_index == 5, "a candidate's index names one object in the whole record"
     assert (skill.candidates, skill.touchsets, skill.doubtful, skill.times_forgotten) == ((), (), (), 1)
+    (section,) = b.of_kind("report")
+    assert section["rows"][0][0] == "0, 4"
     assert not len(b.arm.felt.state()["touched_K_m"])
 
 
