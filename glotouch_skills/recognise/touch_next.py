@@ -293,7 +293,8 @@ class TouchNext(Skill):
         self.refused = (*self.refused, (*_key(option), tried))
 
     def _was_refused(self, option: Option) -> bool:
-        return any(key[:-1] == _key(option) for key in self.refused)
+        key = _key(option)
+        return (*key, True) in self.refused or (*key, False) in self.refused
 
     def _touch(
         self, candidates: tuple[Candidate, ...], chosen: Option, down: Squeezing | None

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -93,11 +92,10 @@ class Rectangle:
 
 def sampled(outline_m: Array) -> Array:
     """Return points (n, 2) on a closed polyline (m, 2), at most `SAMPLE_M` apart, with its corners."""
-    pieces = []
-    for a, b in pairwise(outline_m):
-        steps = max(int(np.ceil(np.linalg.norm(b - a) / SAMPLE_M)), 1)
-        pieces.append(a + np.arange(steps)[:, None] / steps * (b - a))
-    return np.concatenate(pieces)
+    start, side = outline_m[:-1], np.diff(outline_m, axis=0)
+    steps = np.maximum(np.ceil(np.linalg.norm(side, axis=1) / SAMPLE_M), 1).astype(np.int64)
+    share = (np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)) / np.repeat(steps, steps)
+    return np.asarray(np.repeat(start, steps, axis=0) + share[:, None] * np.repeat(side, steps, axis=0))
 
 
 def clearance_m(rectangle: Rectangle, neighbours: Sequence[Neighbour], half_extent_m: Array) -> float:
