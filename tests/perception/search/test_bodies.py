@@ -260,7 +260,7 @@ def test_divisions_that_go_round_in_a_circle_end(monkeypatch: pytest.MonkeyPatch
         return tuple(c for c in giver if c is not shared), (*taker, shared)
 
     monkeypatch.setattr(search_candidates, "redivided", handed_on)
-    monkeypatch.setattr(search_candidates, "_overlap_m", lambda a, b: 1.0)
+    monkeypatch.setattr(search_candidates, "overlap_depth_m", lambda a, b: 1.0)
     blank = SearchMap.blank(np.array([0.2, 0.275]), 3)
     after = separated(Admitted(blank, known, 0, ()), R, 0.01)
     assert sum(any(c is shared for c in k.contacts) for k in after.candidates) == 1
