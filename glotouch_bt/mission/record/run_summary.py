@@ -144,6 +144,8 @@ class RunSummary:
             self.contacts += 1
         elif kind == "candidate":
             self._store(_candidate(to_json(data.get("candidate", data))), str(data.get("node", "")))
+        elif kind == "start_over":
+            self.candidates = []
         elif kind == "ranking":
             self.ranking = to_json(data.get("ranking", data), summarise=True)
         elif kind == "result":

@@ -19,9 +19,12 @@ PATH_POINTS = 4000
 
 
 def candidates(record: RunRecord) -> list[dict[str, Any]]:
-    """Return the last entry of each candidate, in order of index."""
+    """Return the last entry of each candidate that was not forgotten, in order of index."""
     found: dict[int, dict[str, Any]] = {}
-    for e in record.of_kind("candidate", "touchset"):
+    for e in record.of_kind("candidate", "touchset", "start_over"):
+        if e.kind == "start_over":
+            found.clear()
+            continue
         holder = e.data.get("touchset") if e.kind == "touchset" else e.data
         c = holder.get("candidate") if isinstance(holder, dict) else None
         if isinstance(c, dict) and isinstance(c.get("index"), int) and contour_of(c) is not None:
