@@ -7,14 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from glotouch_bt.perception.search import SearchMap, overlap_depth_m
+from glotouch_bt.perception.search import OVERLAP_M, SearchMap, overlap_depth_m
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.perception.touch.outline import KNOWN_QUALITY
 from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
-
-OVERLAP_M = 0.008
-"""Depth from which on two outlines contradict each other: they are known to a few millimetres. Source: ours."""
 
 
 class StartOverParams(SkillParams):

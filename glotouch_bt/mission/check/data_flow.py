@@ -44,7 +44,7 @@ class DataFlow:
         entered: Ids of the nodes that are entered in some state.
         ends: (node id, True: in success) of the nodes that may end so.
         looked: Set in which each requirement was looked at.
-        facts: What node kinds have found out about each node, by node id, whatever the states it is entered in.
+        facts: Results cached by node kinds, by node id; they do not depend on the entry state.
         end: Exit states of the root.
     """
 

@@ -46,7 +46,7 @@ def written_kind(node: NodeSpec, port: str, result: str) -> ValueKind:
 
 @dataclass(frozen=True)
 class _Change:
-    """What a skill does to one variable.
+    """Effect of a skill on one variable.
 
     Attributes:
         variable: The variable.

@@ -4,6 +4,7 @@ from glotouch_bt.perception.search.belonging import joins, of_another, part_of
 from glotouch_bt.perception.search.bodies import BESIDE_M, distinct, outline_of
 from glotouch_bt.perception.search.candidates import (
     HALF_QUALITY_SD_M,
+    OVERLAP_M,
     admit,
     lost_among,
     overlap_depth_m,

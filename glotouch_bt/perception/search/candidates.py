@@ -45,8 +45,8 @@ MIN_CONTACTS = 3
 HALF_QUALITY_SD_M = 0.005
 """Standard deviation of the centre at quality 1/2."""
 OVERLAP_M = 0.008
-"""Depth of the overlap of two outlines from which on their contacts are divided anew. Source: ours; outlines are
-known to a few millimetres."""
+"""Depth of the overlap, m, above which two outlines contradict each other, because bodies do not overlap. Source: ours;
+outlines are known to a few millimetres."""
 UNMET = 0.01
 """Probability that an object was not met although the path touched its place. Source: ours."""
 

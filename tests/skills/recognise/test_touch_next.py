@@ -283,7 +283,7 @@ def test_nothing_lacks_space_when_it_is_known(make) -> None:
 
 
 def test_fingers_on_something_cost_a_choice_not_the_mission(make, things) -> None:
-    """What is refused is not tried again by the `touch_next` of the mission's other ways, which reads what was."""
+    """A later `touch_next` node reads the refused closures and does not try them again."""
     floor = things.floor(0.045)
     b, first = make(Oracle(right=1, enough=3), stuff=[floor], tip_P_m=0.022)
     repeat(b, first)
@@ -316,7 +316,7 @@ def test_fingers_on_a_low_ledge_close_above_it(make, things) -> None:
 
 
 def test_what_did_not_fit_is_tried_again_when_a_neighbour_is_known_better(make, found) -> None:
-    """What the fingers met is still there; what a neighbour's outline kept them from may be free."""
+    """A closure that met something stays refused; one that only did not fit is tried again."""
     one, other = found.round((0.0, -0.08), 0.025), found.round((0.0, 0.08), 0.025, index=1)
     felt = tuple(TouchSet(c, ()) for c in (one, other))
     refused = ((0, 0, 27, 0, True), (0, 30, 27, 0, False))

@@ -97,7 +97,7 @@ class DataFlowAnalysis(Protocol):
 
     @property
     def facts(self) -> dict[int, Any]:
-        """What node kinds have found out about each node, by node id, whatever the states it is entered in."""
+        """Results cached by node kinds, by node id; they do not depend on the entry state."""
 
     def run(self, node: NodeSpec, entry: int) -> ExitStates:
         """Return the exit states of a node that is entered in `entry`."""

@@ -1,4 +1,4 @@
-"""What an object takes up, beyond its fitted outline: its envelope, and its footprint for clearance."""
+"""Envelope and footprint of a candidate: bounds of its contacts and outline, for search and clearance."""
 
 from __future__ import annotations
 
