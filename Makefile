@@ -25,9 +25,10 @@ test-studies: $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m study
 	GLOTOUCH_ALL_EXAMPLES=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m "not study" $(PROPERTIES)
 
-# The pages in Chromium: needs chromium and chromium-driver (Debian's packages).
+# The pages in Chromium: needs chromium and chromium-driver (Debian's packages). One at a time: beside a second window, which draws in
+# software too, a picture can take longer than the driver waits.
 test-browser: $(VENV)/.compiled
-	GLOTOUCH_REQUIRE_BROWSER=1 $(BIN)/python -m pytest -n 2 --dist worksteal tests/browser
+	GLOTOUCH_REQUIRE_BROWSER=1 $(BIN)/python -m pytest tests/browser
 
 check: $(VENV)/.dev
 	$(BIN)/ruff format --check .

@@ -77,12 +77,17 @@ class Page:
         until(lambda: self.driver.execute_script(press, label), f"a button {label!r}")
 
     def picture(self, css: str = "canvas") -> np.ndarray:
-        """Return the pixels (h, w, 3) of the largest such element; no pixels if there is none."""
+        """Return the pixels (h, w, 3) of the largest such element; none without one, or if drawing takes too long."""
+        from selenium.common.exceptions import TimeoutException
+
         found = self.driver.find_elements("css selector", css)
         if not found:
             return np.zeros((0, 0, 3), dtype=np.uint8)
         shown = max(found, key=lambda e: e.size["width"] * e.size["height"])
-        return np.asarray(Image.open(io.BytesIO(shown.screenshot_as_png)).convert("RGB"))
+        try:
+            return np.asarray(Image.open(io.BytesIO(shown.screenshot_as_png)).convert("RGB"))
+        except TimeoutException:  # the driver waits for 10 s; on a busy machine the software needs longer
+            return np.zeros((0, 0, 3), dtype=np.uint8)
 
     def overflow_px(self) -> int:
         """Return by how much the page is wider than the window."""
