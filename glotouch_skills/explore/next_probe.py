@@ -8,10 +8,11 @@ import numpy as np
 
 from glotouch_bt.perception import joined, recognition
 from glotouch_bt.perception.recognition import PARTS, ProbeOption, ProbeTouch, TargetModel, excluded, next_probe_touch
-from glotouch_bt.perception.search import distinct
+from glotouch_bt.perception.search import distinct, separated
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD, Array
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
+from glotouch_bt.skill.probing import HeldTool
 from glotouch_skills.common.planning import TOO_LOW, find_target
 
 PART_S = {"outline": 17.0, "top": 17.0}
@@ -38,8 +39,9 @@ class NextProbe(Skill):
     the target's STL excludes already is not measured. One that is probably not needed is put off, but only until the
     jaws have been used. Without a target all are measured, the least certain outline first.
 
-    Two candidates that are one body become one in `candidates`: they overlap, or they are parts of the target. One
-    without a top is left out: the object was moved, and another candidate was traced where it stands, or will be.
+    Contacts pass to the candidate that explains them better: a trace may have passed on to a neighbour. Two candidates
+    that are one body become one in `candidates`: they overlap, or they are parts of the target. One without a top is
+    left out: the object was moved, and another candidate was traced where it stands, or will be.
 
     SUCCESS: `candidate` and `next_part` are chosen, or `measured_enough` is true and `next_part` is empty.
     """
@@ -52,6 +54,7 @@ class NextProbe(Skill):
     NO_CANDIDATES = Failure("no_candidates", "there is nothing to measure", advice="explore first")
     FAILURES: ClassVar = (TOO_LOW,)
 
+    tool = In(HeldTool, "the held probe; contacts of another section stay as they are", required=False, expected=False)
     known = In(tuple, "all candidates", key="candidates", element=Candidate, required=False)
     measured = In(Candidate, "the candidate measured last", key="candidate", required=False)
     chosen = In(str, "what was measured last; nothing yet", key="next_part", required=False)
@@ -78,6 +81,9 @@ class NextProbe(Skill):
             self.event("note", text=f"candidate {new.index} is left out: nothing stands where it was traced")
         model = self._target()
         candidates = self._distinct(candidates, model)
+        topped = {c.index for c in candidates if c.top_touched}
+        lost = {c.index for c in self.known if c.top_touched} - topped  # what was touched there was another body
+        before = tuple(t for t in before if t.part != "top" or t.candidate not in lost)
         tried = {(t.candidate, t.part) for t in before}
         left = [ProbeTouch(c.index, part) for c in candidates for part in PARTS if (c.index, part) not in tried]
         self.postponed = 0
@@ -94,10 +100,15 @@ class NextProbe(Skill):
         return find_target(self.params.target, self.context.world.objects, self.context.arm.description.gripper).model
 
     def _distinct(self, candidates: tuple[Candidate, ...], model: TargetModel | None) -> tuple[Candidate, ...]:
-        """Return the candidates without those that turned out to be the same body as another one, or a part of the
-        target with another one."""
+        """Return the candidates, each with the contacts that are probably its own, without those that turned out to be
+        the same body as another one, or a part of the target with another one."""
         felt = frozenset(t.candidate.index for t in self.felt or () if t.layers)
-        kept = distinct(candidates, felt)
+        radius_m = self.tool.tip_radius_m if self.tool is not None and self.tool.round else 0.0
+        apart = separated(candidates, radius_m, felt)
+        kept = distinct(apart, felt)
+        altered = sorted(c.index for c in apart if not any(c is old for old in candidates))
+        if altered:
+            self.event("note", text=f"contacts were shared out anew among candidates {', '.join(map(str, altered))}")
         for index in sorted({c.index for c in candidates} - {c.index for c in kept}):
             self.event("note", text=f"candidate {index} is left out: it is the same body as another one")
         if model is None:

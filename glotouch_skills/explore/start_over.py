@@ -76,7 +76,7 @@ class StartOver(Skill):
 def _contradiction(candidates: tuple[Candidate, ...]) -> str:
     """Return why not all candidates can be right; empty if they can."""
     for one, other in combinations(candidates, 2):
-        depth_m = overlap_depth_m(one, other)
+        depth_m = overlap_depth_m(one.contour, other.contour)
         if depth_m > OVERLAP_M:
             return f"the outlines of candidates {one.index} and {other.index} overlap by {1e3 * depth_m:.0f} mm"
     for candidate in candidates:

@@ -4,12 +4,11 @@ from glotouch_bt.perception.search.belonging import joins, of_another, part_of
 from glotouch_bt.perception.search.bodies import BESIDE_M, distinct, outline_of
 from glotouch_bt.perception.search.candidates import (
     HALF_QUALITY_SD_M,
-    OVERLAP_M,
     admit,
     lost_among,
-    overlap_depth_m,
     quality,
     refined,
+    separated,
 )
 from glotouch_bt.perception.search.exploring import seek_next, trace_bodies
 from glotouch_bt.perception.search.map import LEFT_BELOW, SearchMap
@@ -27,5 +26,6 @@ from glotouch_bt.perception.search.policies import (
 from glotouch_bt.perception.search.remaining import chance_left, left_in_words
 from glotouch_bt.perception.search.routes import Routes, segment_is_free
 from glotouch_bt.perception.search.seeking import Sought, seek
+from glotouch_bt.perception.search.sharing import OVERLAP_M, overlap_depth_m
 from glotouch_bt.perception.search.top import BallMove, BallOutcome, Top, TopPlan, TopRule, rounds, top_plan
 from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams, trace, trace_more

@@ -21,13 +21,11 @@ from glotouch_bt.perception.touch import Candidate, Contact, signed_distance
 from glotouch_bt.perception.touch.outline import (
     KNOWN_QUALITY,
     OutlineBelief,
-    convex_hull,
     envelope,
     infer_outline,
     nearest_distance,
-    polygon_distance,
 )
-from glotouch_bt.robot import Array, ParamError
+from glotouch_bt.robot import Array
 
 SEPARATE_NATS = 12.0
 """Minimum gain of log evidence by which two bodies explain contacts better than one. Source: 54 of 77 contours of
@@ -54,13 +52,6 @@ BESIDE_M = 0.020
 MAX_NATS = 7.0
 """Log evidence of a contact that a further outline is assumed to reach at most. Source: ours; the upper quartile is
 4.6."""
-LIKELY_NATS = 4.6
-"""Log evidence of a contact that the other part of two overlapping candidates is assumed to reach at most: fewer
-divisions are evaluated in full. Source: the upper quartile of the contacts of `MAX_NATS`."""
-REDIVIDED_NATS = 5.0
-"""Minimum gain of log evidence by which the contacts of two candidates are divided anew. Source: ours."""
-SOLID_STEP_M = 0.005
-"""Spacing of the places inside a body. Source: ours."""
 DIRECTIONS = 12
 """Number of directions in which contacts are divided."""
 NEAR_M = 0.06
@@ -119,40 +110,6 @@ def division(
     free = _near(path_K_m, contacts)
     evidence, parts = _best_cut(contacts, radius_m, free, -np.inf)
     return (evidence - outline_of(contacts, radius_m, free).log_evidence, tuple(parts)) if parts else whole
-
-
-def redivided(
-    one: tuple[Contact, ...], other: tuple[Contact, ...], radius_m: float, path_K_m: Array
-) -> tuple[tuple[Contact, ...], ...]:
-    """Divide the contacts of two candidates anew by a line, if that explains them better; nothing otherwise.
-
-    It must be better than the present division and than one body. Bodies do not overlap: where the ball would be inside
-    one of them, it would not touch the other.
-
-    Args:
-        one, other: Contacts of each, at their current positions.
-        radius_m, path_K_m: As for `bodies`; the radius is not 0.
-    """
-    both = (*one, *other)
-    free = _near(path_K_m, both)
-    now = sum(
-        outline_of(mine, radius_m, np.concatenate([free, _inside(its, radius_m)])).log_evidence
-        for mine, its in ((one, other), (other, one))
-    )
-    limit = max(now, outline_of(both, radius_m, free).log_evidence) + REDIVIDED_NATS
-    return tuple(_best_cut(both, radius_m, free, limit, solid=True)[1])
-
-
-def _inside(contacts: tuple[Contact, ...], radius_m: float) -> Array:
-    """Return places (n, 2) where the ball would be inside the hull of a body's contacts."""
-    points = np.array([c.point_K_m for c in contacts])
-    try:
-        hull = convex_hull(points)
-    except ParamError:
-        return np.zeros((0, 2))
-    axes = (np.arange(low, high, SOLID_STEP_M) for low, high in zip(hull.min(axis=0), hull.max(axis=0), strict=True))
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    return places[polygon_distance(hull, places) < -radius_m]
 
 
 @dataclass(frozen=True)
@@ -253,30 +210,23 @@ def _divided(contacts: tuple[Contact, ...], radius_m: float, free: Array, gain: 
 
 
 def _best_cut(
-    contacts: tuple[Contact, ...], radius_m: float, free: Array, limit: float, *, solid: bool = False
+    contacts: tuple[Contact, ...], radius_m: float, free: Array, limit: float
 ) -> tuple[float, list[tuple[Contact, ...]]]:
-    """Return the division in two with the largest log evidence above a limit, and this evidence; else no contacts.
-
-    With `solid`, no part is inside the hull of the other one.
-    """
+    """Return the division in two with the largest log evidence above a limit, and this evidence; else no contacts."""
     best: list[tuple[Contact, ...]] = []
-    at_most = LIKELY_NATS if solid else MAX_NATS
-    for part in _partitions(np.array([c.point_K_m for c in contacts])):
+    for part in line_partitions(np.array([c.point_K_m for c in contacts])):
         sides = [tuple(c for c, mine in zip(contacts, part == side, strict=True) if mine) for side in (True, False)]
-        if solid:
-            sides.sort(key=len, reverse=True)
-        around = [np.concatenate([free, _inside(side, radius_m)]) if solid else free for side in reversed(sides)]
-        outlines = [outline_of(sides[0], radius_m, around[0])]
-        if outlines[0].log_evidence + at_most * len(sides[1]) < limit:
+        outlines = [outline_of(sides[0], radius_m, free)]
+        if outlines[0].log_evidence + MAX_NATS * len(sides[1]) < limit:
             continue
-        outlines.append(outline_of(sides[1], radius_m, around[1]))
+        outlines.append(outline_of(sides[1], radius_m, free))
         evidence = sum(o.log_evidence for o in outlines)
         if evidence > limit and min(min(o.contour.size_m) for o in outlines) >= MIN_BODY_M:
             limit, best = evidence, sides
     return limit, best
 
 
-def _partitions(points: Array) -> list[Mask]:
+def line_partitions(points: Array) -> list[Mask]:
     """Return the distinct partitions (n,) of points (n, 2) by lines, with at least MIN_PART points on each side."""
     found: dict[bytes, Mask] = {}
     for angle in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:

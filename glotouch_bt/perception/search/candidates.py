@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import chain, combinations, count
+from itertools import chain, count
 
 import numpy as np
 
@@ -17,10 +17,10 @@ from glotouch_bt.perception.search.bodies import (
     division,
     doubts,
     outline_of,
-    redivided,
     same_body,
 )
 from glotouch_bt.perception.search.map import SearchMap
+from glotouch_bt.perception.search.sharing import shared_out
 from glotouch_bt.perception.search.suspects import TWO_BODIES
 from glotouch_bt.perception.search.tracing import OutlineTrace
 from glotouch_bt.perception.touch import (
@@ -44,9 +44,6 @@ MIN_CONTACTS = 3
 """Minimum number of contacts of a candidate's outline."""
 HALF_QUALITY_SD_M = 0.005
 """Standard deviation of the centre at quality 1/2."""
-OVERLAP_M = 0.008
-"""Depth of the overlap, m, above which two outlines contradict each other, because bodies do not overlap. Source: ours;
-outlines are known to a few millimetres."""
 UNMET = 0.01
 """Probability that an object was not met although the path touched its place. Source: ours."""
 
@@ -193,44 +190,53 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
     )
 
 
-def separated(admitted: Admitted, radius_m: float, exclusion_m: float) -> Admitted:
-    """Divide anew the contacts of candidates whose outlines overlap, the deepest overlap first: bodies do not overlap.
+def separated(
+    candidates: tuple[Candidate, ...], radius_m: float, preferred: frozenset[int] = frozenset()
+) -> tuple[Candidate, ...]:
+    """Return the candidates with the contacts that are probably theirs; see `shared_out`.
 
-    No two groups of contacts are divided twice: among three candidates, the best divisions of the pairs may go round in
-    a circle.
+    One that turned out to be parts of others is left out. The top of one is unknown again if its former centre is
+    outside its new outline: another body was touched there.
+
+    Args:
+        candidates: All candidates.
+        radius_m: Radius of the ball; 0 for another section, whose candidates stay as they are.
+        preferred: Indices of candidates that are kept.
+    """
+    bodies_of = shared_out(candidates, radius_m, preferred)
+    out = []
+    for c in candidates:
+        contacts = bodies_of.get(c.index)
+        if contacts is c.contacts:
+            out.append(c)
+        elif contacts is not None:
+            new = _with(c, contacts, outline_of(contacts, radius_m))
+            elsewhere = float(signed_distance(new.contour, c.contour.centre_K_m[None])[0]) > 0.0
+            out.append(replace(new, top_touched=False) if elsewhere else new)
+    return tuple(out)
+
+
+def all_separated(admitted: Admitted, radius_m: float, exclusion_m: float) -> Admitted:
+    """Return map and candidates after `separated`; the new candidate may have become a part of another one.
 
     Args:
         admitted: Map and candidates.
-        radius_m: Radius of the ball; 0 for another section, whose candidates are left as they are.
+        radius_m: As for `separated`.
         exclusion_m: Margin around the objects that the search avoids.
     """
-    tried: set[frozenset[frozenset[int]]] = set()
-    while radius_m > 0.0:
-        pairs = (p for p in combinations(admitted.candidates, 2) if _groups(*p) not in tried)
-        deepest = max(((overlap_depth_m(*p), p) for p in pairs), key=lambda found: found[0], default=None)
-        if deepest is None or deepest[0] < OVERLAP_M:
-            break
-        one, other = deepest[1]
-        tried.add(_groups(one, other))
-        parts = redivided(one.contacts, other.contacts, radius_m, admitted.belief.path_K_m)
-        if parts:
-            every = {c.index: c for c in admitted.candidates}
-            changed = tuple(dict.fromkeys((*admitted.changed, one.index, other.index)))
-            now = _shared_out(replace(admitted, changed=changed), every, (one, other), parts, radius_m, exclusion_m)
-            admitted = replace(now, index=admitted.index)
-            tried.add(_groups(every[one.index], every[other.index]))
-    return admitted
-
-
-def _groups(a: Candidate, b: Candidate) -> frozenset[frozenset[int]]:
-    """Return what tells two groups of contacts apart from others; contacts are handed on, never copied."""
-    return frozenset(frozenset(map(id, candidate.contacts)) for candidate in (a, b))
-
-
-def overlap_depth_m(a: Candidate, b: Candidate) -> float:
-    """Return how deep the outline of one candidate reaches into the other's; negative if they are apart."""
-    pairs = ((a.contour, b.contour), (b.contour, a.contour))
-    return -min(float(signed_distance(one, other.outline_K_m()).min()) for one, other in pairs)
+    now = separated(admitted.candidates, radius_m)
+    altered = tuple(c.index for c in now if not any(c is old for old in admitted.candidates))
+    if admitted.index is None or not altered:
+        return admitted
+    belief, every = admitted.belief, {c.index: c for c in now}
+    for old in admitted.candidates:
+        new = every.get(old.index)
+        if new is None:
+            belief = belief.without_exclusion(old.index)
+        elif new is not old:
+            belief = belief.with_exclusion(_occupied(new), exclusion_m, new.index)
+    changed = tuple(i for i in dict.fromkeys((*admitted.changed, *altered)) if i in every)
+    return _admitted(belief, every, radius_m, admitted.index if admitted.index in every else changed[0], changed)
 
 
 def _shared_out(

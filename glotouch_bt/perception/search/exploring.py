@@ -9,9 +9,9 @@ from glotouch_bt.perception.search.candidates import (
     UNMET,
     Admitted,
     admit,
+    all_separated,
     divided,
     regroup,
-    separated,
 )
 from glotouch_bt.perception.search.map import SearchMap
 from glotouch_bt.perception.search.moves import SearchPlan
@@ -124,7 +124,7 @@ def trace_bodies(
             elsewhere=elsewhere(rest),
         )
         admitted = regroup(admitted, whole.index, part.index, more, exclusion_m)
-    return separated(admitted, radius, exclusion_m) if _all_traced(admitted) else admitted, traced
+    return all_separated(admitted, radius, exclusion_m), traced
 
 
 def _next_check(admitted: Admitted, checked: set[int]) -> tuple[Candidate, Candidate] | None:

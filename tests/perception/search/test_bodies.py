@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import glotouch_bt.perception.search.bodies as search_bodies
-import glotouch_bt.perception.search.candidates as search_candidates
 from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit
 from glotouch_bt.perception.search.bodies import (
     Doubt,
@@ -19,37 +18,10 @@ from glotouch_bt.perception.search.bodies import (
     division,
     doubts,
     outline_of,
-    redivided,
 )
-from glotouch_bt.perception.search.candidates import Admitted, divided, quality, regroup, separated
+from glotouch_bt.perception.search.candidates import divided, regroup
 from glotouch_bt.perception.touch import Candidate, Contact
-
-R = 0.006
-NO_PATH = np.zeros((0, 2))
-
-
-def contact(x: float, y: float, angle: float) -> Contact:
-    """A ball's contact with a surface through (x, y) whose outward normal has this angle."""
-    out = np.array([np.cos(angle), np.sin(angle), 0.0])
-    tip = np.array([x, y, 0.018]) + R * out
-    return Contact(0.0, tip, -out, out, tip[:2] - R * out[:2], 1.0)
-
-
-def disc(x: float, y: float, radius: float, degrees: tuple[float, ...]) -> tuple[Contact, ...]:
-    return tuple(contact(x + radius * np.cos(a), y + radius * np.sin(a), a) for a in np.deg2rad(degrees))
-
-
-def box(x: float, length: float, width: float) -> tuple[Contact, ...]:
-    """Nine contacts round a box: three on each long side, two on the end on the left and one on the right."""
-    along = [(x + t * length, side * 0.5 * width, side * np.pi / 2) for side in (1, -1) for t in (-0.35, 0.0, 0.35)]
-    ends = [(x - 0.5 * length, 0.3 * width, np.pi), (x - 0.5 * length, -0.3 * width, np.pi), (x + 0.5 * length, 0, 0)]
-    return tuple(contact(*c) for c in (*along, *ends))
-
-
-def candidate(index: int, contacts: tuple[Contact, ...]) -> Candidate:
-    outline = outline_of(contacts, R)
-    return Candidate(index, outline.contour, 0.018, quality(outline), contacts)
-
+from tests.support.ball_contacts import NO_PATH, R, box, candidate, contact, disc
 
 LEFT = disc(-0.03, 0.0, 0.03, (60, 105, 150, 195, 240, 290))
 RIGHT = disc(0.02, 0.0, 0.02, (-80, -30, 10, 60, 110))
@@ -211,57 +183,3 @@ def test_the_gain_of_a_division_is_that_of_its_parts() -> None:
     assert gain == pytest.approx(alone - outline_of((*LEFT, *RIGHT), R).log_evidence)
     assert gain > 12.0 > division(box(0.0, 0.1, 0.044), R, NO_PATH)[0]
     assert division(LEFT[:3], R, NO_PATH)[0] == -np.inf
-
-
-MIXED = (*LEFT[:3], *RIGHT[3:]), (*LEFT[3:], *RIGHT[:3])
-"""The contacts of the two discs that touch, each divided among both candidates."""
-
-
-def test_contacts_mixed_between_two_bodies_are_divided_anew() -> None:
-    found = redivided(*MIXED, R, NO_PATH)
-    assert {frozenset(id(c) for c in part) for part in found} == {
-        frozenset(id(c) for c in part) for part in (LEFT, RIGHT)
-    }
-    assert not redivided(LEFT, RIGHT, R, NO_PATH), "the line between the discs is found already"
-    assert not redivided(LEFT[::2], LEFT[1::2], R, NO_PATH), "all are of one body"
-
-
-def test_candidates_that_overlap_become_the_bodies_that_do_not() -> None:
-    """The indices stay, and so does a candidate that overlaps none."""
-    far = candidate(2, disc(0.1, 0.1, 0.03, (0, 60, 120, 180, 240, 300)))
-    mixed = tuple(candidate(i, c) for i, c in enumerate(MIXED))
-    belief = SearchMap.blank((0.2, 0.15), expected=3)
-    for c in (*mixed, far):
-        belief = belief.with_exclusion(c.contour, 0.01, c.index)
-    before = admit_nothing(belief, (*mixed, far))
-    before = replace(before, index=0, changed=(0,))
-    after = separated(before, R, 0.01)
-    assert (after.index, set(after.changed), [c.index for c in after.candidates]) == (0, {0, 1}, [0, 1, 2])
-    centres = sorted(tuple(c.contour.centre_K_m) for c in after.candidates[:2])
-    np.testing.assert_allclose(centres, [[-0.03, 0.0], [0.02, 0.0]], atol=3e-3)
-    assert after.candidates[2] is far
-    assert after.belief.found == 3
-    assert separated(before, 0.0, 0.01) is before, "contacts of fingers are too far off"
-
-
-def test_divisions_that_go_round_in_a_circle_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each pair of three candidates hands the same contact on: without a memory of its divisions it never ends."""
-    shared = contact(0.0, 0.0, 0.0)
-    apart = [disc(x, 0.1, 0.02, (0, 60, 120, 180, 240, 300)) for x in (-0.1, 0.0, 0.1)]
-    known = tuple(candidate(i, (*own, shared) if i == 0 else own) for i, own in enumerate(apart))
-    calls: list[int] = []
-
-    def handed_on(one: tuple[Contact, ...], other: tuple[Contact, ...], *_: object) -> tuple[tuple[Contact, ...], ...]:
-        calls.append(len(calls))
-        assert len(calls) < 100
-        if not any(c is shared for c in (*one, *other)):
-            return ()
-        giver, taker = (one, other) if any(c is shared for c in one) else (other, one)
-        return tuple(c for c in giver if c is not shared), (*taker, shared)
-
-    monkeypatch.setattr(search_candidates, "redivided", handed_on)
-    monkeypatch.setattr(search_candidates, "overlap_depth_m", lambda a, b: 1.0)
-    blank = SearchMap.blank(np.array([0.2, 0.275]), 3)
-    after = separated(Admitted(blank, known, 0, ()), R, 0.01)
-    assert sum(any(c is shared for c in k.contacts) for k in after.candidates) == 1
-    assert sum(len(k.contacts) for k in after.candidates) == 19
