@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -83,7 +84,7 @@ def overlap_depth_m(a: Contour, b: Contour) -> float:
 
 
 def _ids(contacts: tuple[Contact, ...]) -> frozenset[int]:
-    """Return what tells a group of contacts from others; contacts are handed on, never copied."""
+    """Return what tells a group of contacts from others."""
     return frozenset(map(id, contacts))
 
 
@@ -91,23 +92,37 @@ def _in_time(*groups: tuple[Contact, ...]) -> tuple[Contact, ...]:
     return tuple(sorted((c for group in groups for c in group), key=lambda c: c.stamp_s))
 
 
+class _Group:
+    """Contacts in their order as the key of a cache. They are handed on, never copied: the same objects are the same."""
+
+    def __init__(self, contacts: tuple[Contact, ...]) -> None:
+        self.contacts, self.ids = contacts, tuple(map(id, contacts))
+
+    def __hash__(self) -> int:
+        return hash(self.ids)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Group) and self.ids == other.ids
+
+
+@lru_cache(maxsize=2048)
+def _outline(group: _Group, radius_m: float) -> OutlineBelief:
+    return outline_of(group.contacts, radius_m)
+
+
 @dataclass
 class _Outlines:
-    """Outlines of groups of contacts, each inferred once, and what they say about the steps.
+    """Outlines of groups of contacts, and what they say about the steps.
 
     Attributes:
         radius_m: Radius of the ball.
     """
 
     radius_m: float
-    _known: dict[frozenset[int], OutlineBelief] = field(default_factory=dict)
     _depths: dict[frozenset[frozenset[int]], float] = field(default_factory=dict)
 
     def of(self, contacts: tuple[Contact, ...]) -> OutlineBelief:
-        key = _ids(contacts)
-        if key not in self._known:
-            self._known[key] = outline_of(contacts, self.radius_m)
-        return self._known[key]
+        return _outline(_Group(contacts), self.radius_m)
 
     def overlap_m(self, a: tuple[Contact, ...], b: tuple[Contact, ...]) -> float:
         """Return the depth of the overlap of two bodies; 0 if they are apart."""
@@ -148,6 +163,8 @@ class _Outlines:
             limit = self.of(parts[-1]).log_evidence
             if len(parts) == 2 and limit + MAX_NATS * len(parts[0]) < before + gain:
                 continue
+            if sum(self.of(part).log_evidence for part in parts) <= before + gain:
+                continue  # overlaps only make it less; to find them takes as long as the inference of the outlines
             if not all(self.is_plausible(part) for part in parts):
                 continue
             its = self.evidence(step, changed) - before
