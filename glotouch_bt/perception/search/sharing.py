@@ -93,7 +93,7 @@ def _in_time(*groups: tuple[Contact, ...]) -> tuple[Contact, ...]:
 
 
 class _Group:
-    """Contacts in their order as the key of a cache. They are handed on, never copied: the same objects are the same."""
+    """Contacts in their order as the key of a cache; they are handed on, never copied."""
 
     def __init__(self, contacts: tuple[Contact, ...]) -> None:
         self.contacts, self.ids = contacts, tuple(map(id, contacts))
