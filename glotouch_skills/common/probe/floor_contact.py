@@ -15,7 +15,8 @@ FLOOR_SEARCH_M = 0.005
 """Search for the floor down to this far below its nominal height."""
 RIM_M = 0.015
 """The descent is guarded from this height above the container's rim to this depth below it: the registration may be
-wrong by more than the distance to the walls. Source: ours."""
+wrong by more than the distance to the walls. Where something may stand, all of it is: an object may be higher than the
+box. Source: ours."""
 GUARDED_FROM_M = 0.04
 """Height above the floor from which the descent is guarded: the probe may have sunk in the jaws by its handle."""
 GUARDED_M_S = 0.02
@@ -59,7 +60,7 @@ def feel_floor(
     high, floor = float(prober.tip_K_m[2]), tool.floor_z_K_m
     inside_m_s = GUARDED_M_S if slowly else min(speed_m_s, FREE_M_S)
     paces = (
-        (high - rim - RIM_M, GUARDED_M_S),
+        (0.0 if slowly else high - rim - RIM_M, GUARDED_M_S),
         (high - rim + RIM_M, inside_m_s),
         (high - floor - GUARDED_FROM_M, GUARDED_M_S),
         (high - floor - SLOW_FROM_M, SLOW_M_S),

@@ -168,7 +168,9 @@ def test_tool_pickup__no_floor(make) -> None:
     assert not b.arm.scene._allowed
 
 
-@pytest.mark.parametrize("top_m", [0.02, 0.06, 0.085], ids=["low", "up to the rim", "higher than the box"])
+@pytest.mark.parametrize(
+    "top_m", [0.02, 0.06, 0.085, 0.11], ids=["low", "up to the rim", "higher than the box", "much higher"]
+)
 def test_the_next_corner_is_taken_if_something_stands_in_the_first(make, things, top_m) -> None:
     b, skill = make(standing=[things.post((-0.13, -0.18), 0.03, top_m)])
     b.run(skill)
