@@ -11,23 +11,23 @@ demo: $(VENV)
 	@echo "next: source $(BIN)/activate, then: glotouch run calibrate --live"
 
 # Quick tests: no whole mission in MuJoCo, no browser.
-test: $(VENV)/.compiled
+test: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not study" --ignore=tests/integration --ignore=tests/browser
 
 # Whole missions, backends and conformance in MuJoCo and on simulated devices, for which some tests wait.
-test-integration: $(VENV)/.compiled
+test-integration: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not study" tests/integration
 
 # Slow tests, among them whole benches on a small scale: minutes that show little more than the tests of their parts. Then the
 # properties of which `make test` tries fewer examples. Not in .ci/run.
 PROPERTIES = $(shell grep -rlE "support.examples import|preempt_all_along" tests --include="test_*.py")
-test-studies: $(VENV)/.compiled
+test-studies: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m study
 	GLOTOUCH_ALL_EXAMPLES=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m "not study" $(PROPERTIES)
 
 # The pages in Chromium: needs chromium and chromium-driver (Debian's packages). One at a time: beside a second window, which draws in
 # software too, a picture can take longer than the driver waits.
-test-browser: $(VENV)/.compiled
+test-browser: $(VENV)/.dev $(VENV)/.compiled
 	GLOTOUCH_REQUIRE_BROWSER=1 $(BIN)/python -m pytest tests/browser
 
 check: $(VENV)/.dev
@@ -45,12 +45,13 @@ $(VENV): requirements.txt pyproject.toml
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $(VENV)
 
-$(VENV)/.dev: $(VENV) requirements-dev.txt
+# What follows is in the environment and goes with it; the environment's own time, which each file made in it changes, does not count.
+$(VENV)/.dev: requirements.txt pyproject.toml requirements-dev.txt | $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.txt
 	touch $(VENV)/.dev
 
-# The machine code of the numerical loops: tests that start many processes would compile it in each.
-$(VENV)/.compiled: $(VENV)/.dev
+# The machine code of the numerical loops: tests that start many processes would compile it in each. It needs nothing of .dev.
+$(VENV)/.compiled: requirements.txt pyproject.toml | $(VENV)
 	$(BIN)/python tests/support/compile_all.py
 	touch $(VENV)/.compiled
 

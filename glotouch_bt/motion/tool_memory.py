@@ -102,8 +102,7 @@ class FeltSpace:
         heights = [
             float(met[0, 2])
             for met in self._met_K_m
-            if met[0, 2] > tip_K_m
-            and np.mean([_away_m(places_K_m, place).min() <= SAME_PLACE_M for place in met]) >= COVERED_SHARE
+            if met[0, 2] > tip_K_m and np.mean(_nearest_m(met, places_K_m) <= SAME_PLACE_M) >= COVERED_SHARE
         ]
         return max(heights, default=None)
 
@@ -147,6 +146,11 @@ class FeltSpace:
 def _away_m(places_K_m: Array, place_K_m: Array) -> Array:
     """Return the horizontal distances (n,) of places (n, 2 or 3) from one place (2 or 3,)."""
     return np.asarray(np.linalg.norm(places_K_m[:, :2] - np.asarray(place_K_m)[:2], axis=1))
+
+
+def _nearest_m(places_K_m: Array, others_K_m: Array) -> Array:
+    """Return the horizontal distances (n,) of places (n, 2 or 3) from the nearest of others (m, 2 or 3)."""
+    return np.asarray(np.linalg.norm(places_K_m[:, None, :2] - others_K_m[None, :, :2], axis=2).min(axis=1))
 
 
 class ToolSeat:

@@ -11,6 +11,13 @@ from tests.mission.conftest import load, registry  # noqa: F401
 from tests.skills.conftest import bench, found, things, tool, world  # noqa: F401
 
 BLOCK_M = (0.05, 0.04, 0.06)
+FIRST = "test_the_page_is_true"
+"""The tutorial, test of the longest chain of commands: one process would end with it while the others have nothing."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the tutorial."""
+    items.sort(key=lambda item: item.name != FIRST)
 
 
 @pytest.fixture(scope="session")

@@ -44,6 +44,8 @@ RELEASE_MARGIN_M = 0.002
 """Clearance of the open fingers at the place, beyond `CLEARANCE_M`: error of the carried object."""
 PLACES_AT_ONCE = 250
 """Number of places that are rated in one numpy operation, which takes some milliseconds."""
+ROUNDING_M = 1e-9
+"""Far above the rounding of coordinates, far below any gap that counts. Source: ours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,10 +209,10 @@ class ClearPlanner:
             turned = placed(own, FreePlace(moving.index, centre, np.zeros(2), turn, gap))
             for k in range(0, len(centres), PLACES_AT_ONCE):
                 some = centres[k : k + PLACES_AT_ONCE] - centre
-                free = free_gap_m(turned, some, standing, self.half_extent_m) >= gap
+                some = some[keeps_gap(turned, some, gap, standing, self.half_extent_m)]
                 if leave:
-                    free &= free_gap_m(turned, some, [own], self.half_extent_m) >= 0.0
-                rated += [(float(np.linalg.norm(shift)), turn, shift) for shift in some[free]]
+                    some = some[keeps_gap(turned, some, 0.0, [own], self.half_extent_m)]
+                rated += [(float(np.linalg.norm(shift)), turn, shift) for shift in some]
                 yield None
         chosen: list[FreePlace] = []
         for _, turn, shift in sorted(rated, key=lambda r: (r[0], abs(r[1]))):
@@ -231,22 +233,28 @@ def placed(one: Neighbour, place: FreePlace) -> Neighbour:
     return Neighbour.within(one.index, np.array([place.moved(p) for p in one.corners_K_m]))
 
 
-def free_gap_m(
-    one: Neighbour, shifts_K_m: Array, others: Sequence[Neighbour], half_extent_m: Array
+def keeps_gap(
+    one: Neighbour, shifts_K_m: Array, gap_m: float, others: Sequence[Neighbour], half_extent_m: Array
 ) -> Array:  # fmt: skip
-    """Return the gap (n,) of a footprint from the nearest object or wall after each displacement (n, 2).
+    """Return after which displacements (n,), bool, a footprint keeps a gap from all other objects and from the walls.
+
+    A displacement that a wall or one object rules out is not compared with the rest.
 
     Args:
         one: The footprint.
         shifts_K_m: (n, 2).
+        gap_m: The gap.
         others: What stands there.
         half_extent_m: (2,) half of the container's interior.
     """
-    points = one.points_K_m[None] + shifts_K_m[:, None]
-    least = (half_extent_m - np.abs(points)).min(axis=(1, 2))
+    low, high = one.points_K_m.min(axis=0) + shifts_K_m, one.points_K_m.max(axis=0) + shifts_K_m
+    free = (half_extent_m - np.maximum(high, -low)).min(axis=1) >= gap_m
     for other in others:
-        there = other.distance_m(points.reshape(-1, 2)).reshape(points.shape[:2])
-        back = (other.points_K_m[None] - shifts_K_m[:, None]).reshape(-1, 2)
-        here = one.distance_m(back).reshape(len(shifts_K_m), -1)
-        least = np.minimum(least, np.minimum(there.min(axis=1), here.min(axis=1)))
-    return np.asarray(least)
+        apart = np.maximum(other.points_K_m.min(axis=0) - high, low - other.points_K_m.max(axis=0)).max(axis=1)
+        close = apart < gap_m + ROUNDING_M  # what is farther along one axis is farther
+        for standing, moved, way in ((other, one, shifts_K_m), (one, other, -shifts_K_m)):
+            some = free & close
+            if some.any():
+                points = (moved.points_K_m[None] + way[some, None]).reshape(-1, 2)
+                free[some] = standing.distance_m(points).reshape(some.sum(), -1).min(axis=1) >= gap_m
+    return np.asarray(free)

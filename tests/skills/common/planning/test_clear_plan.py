@@ -10,8 +10,8 @@ import pytest
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.perception.touch import signed_distance
 from glotouch_skills.common.planning import NEEDED_M, Clearing, ClearPlanner, Neighbour, finger_space_m
-from glotouch_skills.common.planning.clear_plan import GAPS_M, GRID_M, FreePlace, free_gap_m, placed
-from glotouch_skills.common.planning.finger_space import cramped_stances
+from glotouch_skills.common.planning.clear_plan import GAPS_M, GRID_M, FreePlace, keeps_gap, placed
+from glotouch_skills.common.planning.finger_space import cramped_stances, gap_m, wall_gap_m
 from glotouch_skills.make_space.carried import Grip, after_carry
 
 GRIPPER = RIZON4_XENSE.gripper
@@ -31,26 +31,48 @@ def stands_at(place: FreePlace, thing):
     return after_carry(thing, Grip(centre, 0.0), Grip(place.moved(centre), place.turn_rad), 0.009)
 
 
+def assert_gap(gap: float, error: float, one: Neighbour, shift, others) -> None:
+    """The gap is this one, to an error, all in m."""
+    for least in (gap - error, gap + error):
+        assert keeps_gap(one, np.array([shift]), least, others, HALF)[0] == (least < gap)
+
+
 @pytest.mark.parametrize("shift_m", [0.05, 0.1])
 def test_the_gap_of_two_discs_is_the_distance_less_their_radii(found, shift_m: float) -> None:
     one, other = (Neighbour.of(found.round((0.0, y), r)) for y, r in ((0.0, 0.02), (-0.02, 0.03)))
-    gap = free_gap_m(one, np.array([[0.0, shift_m]]), [other], HALF)[0]
     radius, other_radius = (0.5 * np.ptp(n.points_K_m[:, 0]) for n in (one, other))
-    assert gap == pytest.approx(min(0.02 + shift_m - radius - other_radius, 0.2 - shift_m - radius), abs=3e-4)
+    gap = min(0.02 + shift_m - radius - other_radius, 0.2 - shift_m - radius)
+    assert_gap(gap, 3e-4, one, [0.0, shift_m], [other])
 
 
 def test_a_turned_box_reaches_the_wall_with_its_other_side(found) -> None:
     box = Neighbour.of(found.box((0.0, 0.0), (0.08, 0.04)))
     turned = placed(box, FreePlace(0, np.zeros(2), np.zeros(2), 0.5 * math.pi, 0.0))
-    shift = np.array([[0.1, 0.0]])
-    assert free_gap_m(box, shift, [], HALF)[0] == pytest.approx(0.05 - 0.04, abs=1e-6)
-    assert free_gap_m(turned, shift, [], HALF)[0] == pytest.approx(0.05 - 0.02, abs=1e-6)
+    assert_gap(0.05 - 0.04, 1e-6, box, [0.1, 0.0], [])
+    assert_gap(0.05 - 0.02, 1e-6, turned, [0.1, 0.0], [])
 
 
 def test_one_that_swallows_the_other_is_not_free(found) -> None:
     small, large = Neighbour.of(found.round((0.0, 0.0), 0.01)), Neighbour.of(found.box((0.05, 0.0), (0.08, 0.08)))
-    assert free_gap_m(small, np.array([[0.05, 0.0]]), [large], HALF)[0] < 0.0
-    assert free_gap_m(large, np.array([[-0.05, 0.0]]), [small], HALF)[0] < 0.0
+    assert not keeps_gap(small, np.array([[0.05, 0.0]]), 0.0, [large], HALF)[0]
+    assert not keeps_gap(large, np.array([[-0.05, 0.0]]), 0.0, [small], HALF)[0]
+
+
+def test_many_places_are_told_as_one_by_one_in_any_order_of_the_others(found) -> None:
+    """Near and far from three objects and the walls, against the distances of all points."""
+    one = Neighbour.of(found.box((0.0, 0.0), (0.05, 0.03), 0.3))
+    others = [
+        Neighbour.of(c)
+        for c in (found.round((0.06, 0.1), 0.03), found.box((0.05, -0.1), (0.08, 0.04), 0.4), found.round((0, 0), 0.02))
+    ]
+    shifts = np.random.default_rng(0).uniform(-HALF, HALF, (400, 2))
+    for gap in (0.0, 0.012, 0.028):
+        got = keeps_gap(one, shifts, gap, others, HALF)
+        assert 20 < got.sum() < 380
+        np.testing.assert_array_equal(got, keeps_gap(one, shifts, gap, others[::-1], HALF))
+        for shift, free in zip(shifts, got, strict=True):
+            there = one.moved(shift)
+            assert free == (min(wall_gap_m(there, HALF), *(gap_m(there, other) for other in others)) >= gap)
 
 
 def test_the_neighbour_that_blocks_the_fingers_is_taken_out_and_makes_space(found) -> None:
@@ -104,8 +126,7 @@ def test_obstacles_are_kept_clear(found) -> None:
     clearing = last(ClearPlanner((disc,), HALF, GRIPPER, (wall,)).take_out(disc))
     assert clearing is not None
     for place in clearing.places:
-        gap = free_gap_m(Neighbour.of(disc), place.shift_K_m[None], [wall], HALF)[0]
-        assert gap >= GAPS_M[-1] - 1e-9
+        assert keeps_gap(Neighbour.of(disc), place.shift_K_m[None], GAPS_M[-1] - 1e-9, [wall], HALF)[0]
 
 
 def test_a_full_box_has_no_place(found) -> None:
