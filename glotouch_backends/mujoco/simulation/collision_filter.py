@@ -139,8 +139,9 @@ def _leave_out(
 
 def _box(model: mujoco.MjModel, geom: int, position: Array, rotation: Array) -> Array:
     """Return the lowest and the highest corner (6,) of a geom's box in a frame in which its pose is given."""
-    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
-        return np.repeat([-np.inf, np.inf], 3)
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:  # a half space: bounded only along an axis of the frame
+        normal = rotation[:, 2]
+        return np.concatenate([np.where(normal == -1.0, position, -np.inf), np.where(normal == 1.0, position, np.inf)])
     centre = position + rotation @ model.geom_aabb[geom, :3]
     half = np.abs(rotation) @ model.geom_aabb[geom, 3:]
     return np.concatenate([centre - half, centre + half])
