@@ -16,6 +16,8 @@ MOVING_M_S = 0.002
 """Report the jaws as moving above this aperture rate. Source: ours."""
 MIN_FORCE_N = 0.1
 """Smallest closing force. Source: ours."""
+NOISE_REPORTS = 128
+"""Number of reports for which noise is drawn at once."""
 WINDUP_M = 0.001
 """Largest lead of the ramp over the jaws, beyond what the force limit needs. Source: ours."""
 
@@ -109,6 +111,7 @@ class JawReports:
     ) -> None:
         self._c, self._proof = conditions, proof or AxisProof(conditions)
         self._rng = stream(seed, "aperture")
+        self._noise: list[float] = []  # drawn and not used yet, last first
         self._force_gain, self._force_offset_N = force_errors(conditions, seed)
         self._motor_m = first.aperture_m + 0.5 * conditions.jaw_backlash_m
         self._bias = float(stream(seed, "aperture_bias").uniform(*conditions.aperture_bias_m))
@@ -131,7 +134,9 @@ class JawReports:
         force = (force - offset_N) / self._force_gain
         aperture += self._bias
         if c.aperture_noise_sd_m > 0.0:
-            aperture += c.aperture_noise_sd_m * float(self._rng.standard_normal())
+            if not self._noise:
+                self._noise = self._rng.standard_normal(NOISE_REPORTS)[::-1].tolist()
+            aperture += c.aperture_noise_sd_m * self._noise.pop()
         if c.aperture_resolution_m > 0.0:
             aperture = round(aperture / c.aperture_resolution_m) * c.aperture_resolution_m
         return GripperState(state.stamp_s, aperture, force, state.moving)

@@ -90,9 +90,11 @@ class Servo:
         self._basis = np.hstack([*hermite(period_s, STEPS), 1.0 - along, along, np.ones((STEPS, 1))])
         self._terms = np.zeros((11, n))
         self._knots: Array = self._terms[:4]  # q0, dq0, q1, dq1
+        self._scaled, self._torques = self._terms[4:8], (self._terms[8], self._terms[9])
         self._asked = np.zeros((4, n))
         self._ddq = np.zeros(n)
         self._vector, self._product = np.zeros(model.nv), np.zeros(model.nv)
+        self._of_arm = self._vector[self._dof], self._product[self._dof]
 
     @property
     def q(self) -> Array:
@@ -158,16 +160,14 @@ class Servo:
                 return
             target = (k[2], k[3], np.zeros_like(k[2]))
         q, dq, ddq = self._brake() if target is None else target
-        k[0], k[1] = k[2], k[3]
+        k[:2] = k[2:]
         k[2], k[3] = q, dq
-        np.multiply(k, self._ahead, out=terms[4:8])
-        terms[8] = self._inertia(self._ddq)
-        terms[9] = self._inertia(ddq)
+        np.multiply(k, self._ahead, out=self._scaled)
+        # M ddq / kp at both ends, with the present inertia matrix (the armature is in M)
+        vector, product = self._of_arm
+        for torque, acceleration in zip(self._torques, (self._ddq, ddq), strict=True):
+            vector[:] = acceleration
+            mujoco.mj_mulM(self._model, self._data, self._product, self._vector)
+            np.multiply(product, self._per_kp, out=torque)
         np.matmul(self._basis, terms, out=ctrl)
         self._ddq[:] = ddq
-
-    def _inertia(self, ddq: Array) -> Array:
-        """Return M ddq / kp with the present inertia matrix (the armature is in M)."""
-        self._vector[self._dof] = ddq
-        mujoco.mj_mulM(self._model, self._data, self._product, self._vector)
-        return np.asarray(self._product[self._dof] * self._per_kp)

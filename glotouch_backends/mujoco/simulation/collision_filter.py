@@ -41,7 +41,7 @@ may leave it faster than it came. Whatever is faster touches one period late. So
     "f8[:, ::1]",
     "f8[:, ::1]",
     "f8[:, ::1]",
-    "f8[:, ::1]",
+    "f8[:, :, ::1]",
     "f8[::1]",
     "f8[::1]",
     "f8[:, ::1]",
@@ -61,7 +61,7 @@ def _leave_out(
     xpos: Array,
     xmat: Array,
     last: Array,
-    spans: Array,
+    frames: Array,
     qpos: Array,
     qvel: Array,
     forces: Array,
@@ -81,23 +81,49 @@ def _leave_out(
         owners: (m,) index of its body in `bodies`.
         xpos, xmat, qpos, qvel, forces: Of mjData, `forces` is xfrc_applied.
         last: (objects, 7) qpos of each object at the last call; updated.
-        spans: (n, 6) lowest and highest corner of each moving body's box in B at the last call; updated.
+        frames: (n, 4, 3) centre of each moving body's box in B at the last call, and the vectors from it to the middles
+            of three faces; updated.
         objects: Number of objects.
     """
     n = len(moving)
-    reach = np.zeros(n)
+    reach, spans = np.zeros(n), np.zeros((n, 6))  # lowest and highest corner of each box in B
     near = np.zeros(n, dtype=np.bool_)  # objects that may move in this period, and everything else that moves
     near[objects:] = True
     for b in range(n):
         body, moved = moving[b, 0], 0.0
         for i in range(3):
-            centre, half = xpos[body, i], 0.0
+            centre, half, way = xpos[body, i], 0.0, 0.0
             for j in range(3):
                 centre += xmat[body, 3 * i + j] * boxes[b, j]
-                half += abs(xmat[body, 3 * i + j]) * boxes[b, 3 + j]
-            moved = max(moved, abs(centre - half - spans[b, i]), abs(centre + half - spans[b, 3 + i]))
+                side = xmat[body, 3 * i + j] * boxes[b, 3 + j]
+                half += abs(side)
+                way += abs(side - frames[b, 1 + j, i])
+                frames[b, 1 + j, i] = side
+            moved = max(moved, way + abs(centre - frames[b, 0, i]))  # of any point of the box
+            frames[b, 0, i] = centre
             spans[b, i], spans[b, 3 + i] = centre - half, centre + half
         reach[b] = GAP_M + MOTIONS * moved
+    # Distance of two boxes along the axis of B along which it is largest; if it is small, also along the boxes' axes.
+    gaps = np.full((n, n), np.inf)
+    for a in range(n):
+        for b in range(a + 1, n):
+            if collide[a, b]:
+                gaps[a, b] = -np.inf
+                for i in range(3):
+                    gaps[a, b] = max(gaps[a, b], spans[a, i] - spans[b, 3 + i], spans[b, i] - spans[a, 3 + i])
+                if gaps[a, b] < reach[a] + reach[b]:
+                    for c in range(6):
+                        owner, axis = (a, c) if c < 3 else (b, c - 3)
+                        other, apart, half = a + b - owner, 0.0, 0.0
+                        for i in range(3):
+                            apart += xmat[moving[owner, 0], 3 * i + axis] * (frames[a, 0, i] - frames[b, 0, i])
+                        for j in range(3):
+                            along = 0.0
+                            for i in range(3):
+                                along += xmat[moving[owner, 0], 3 * i + axis] * frames[other, 1 + j, i]
+                            half += abs(along)
+                        gaps[a, b] = max(gaps[a, b], abs(apart) - half - boxes[owner, 3 + axis])
+            gaps[b, a] = gaps[a, b]
     for b in range(objects):
         body, at, dof = moving[b, 0], moving[b, 1], moving[b, 2]
         near[b] = awake[body] != 0
@@ -109,22 +135,15 @@ def _leave_out(
     for _ in range(objects):  # what is near something that may be pushed may be pushed too
         for a in range(objects):
             for b in range(n):
-                if near[b] and not near[a]:
+                if near[b] and not near[a] and gaps[a, b] < reach[b]:
                     near[a] = True
-                    for i in range(3):
-                        near[a] &= spans[a, i] < spans[b, 3 + i] + reach[b] and spans[b, i] < spans[a, 3 + i] + reach[b]
-                    if near[a]:
-                        reach[a] = max(reach[a], reach[b])  # what it is hit by may move it as fast
+                    reach[a] = max(reach[a], reach[b])  # what it is hit by may move it as fast
     touches = np.zeros(len(bodies), dtype=np.bool_)
     for a in range(n):
         if near[a]:
             for b in range(a + 1, n):
-                if near[b] and collide[a, b] and not (touches[a] and touches[b]):
-                    away, apart = reach[a] + reach[b], False
-                    for i in range(3):
-                        apart |= spans[a, i] > spans[b, 3 + i] + away or spans[b, i] > spans[a, 3 + i] + away
-                    if not apart:
-                        touches[a] = touches[b] = True
+                if near[b] and collide[a, b] and gaps[a, b] <= reach[a] + reach[b]:
+                    touches[a] = touches[b] = True
             for g in range(len(fixed)):
                 if collide[a, owners[g]] and not (touches[a] and touches[owners[g]]):
                     apart = False
@@ -139,8 +158,9 @@ def _leave_out(
 
 def _box(model: mujoco.MjModel, geom: int, position: Array, rotation: Array) -> Array:
     """Return the lowest and the highest corner (6,) of a geom's box in a frame in which its pose is given."""
-    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
-        return np.repeat([-np.inf, np.inf], 3)
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:  # a half space: bounded only along an axis of the frame
+        normal = rotation[:, 2]
+        return np.concatenate([np.where(normal == -1.0, position, -np.inf), np.where(normal == 1.0, position, np.inf)])
     centre = position + rotation @ model.geom_aabb[geom, :3]
     half = np.abs(rotation) @ model.geom_aabb[geom, 3:]
     return np.concatenate([centre - half, centre + half])
@@ -197,8 +217,8 @@ class CollisionFilter:
         owners = np.array([i for _, i in geoms], dtype=np.int64)
         kinds = np.stack([model.body_contype[bodies], model.body_conaffinity[bodies]], axis=1)
         last: Array = np.full((len(free), 7), np.nan)
-        spans: Array = np.full((len(moving), 6), np.inf)  # at first everything is near
-        now = data.xpos, data.xmat, last, spans, data.qpos, data.qvel, data.xfrc_applied
+        frames: Array = np.full((len(moving), 4, 3), np.inf)  # at first everything is near
+        now = data.xpos, data.xmat, last, frames, data.qpos, data.qvel, data.xfrc_applied
         self._contype, self._conaffinity = model.body_contype, model.body_conaffinity
         self._compiled = model.body_contype.copy(), model.body_conaffinity.copy()
         about = moving, bodies, collide, boxes, fixed, owners

@@ -35,15 +35,13 @@ class ControlTrace:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         self._model, self._start = copy.copy(model), copy.copy(data)
         self._controls: list[Array] = []
-        self._limits: list[Array] = []
+        self._limits: list[bytes] = []
 
     def add(self, controls: Array, force_limits: Array) -> None:
         """Record a chunk before its steps: controls (steps, nu) and `actuator_forcerange` (nu, 2)."""
         self._controls.append(controls.copy())
-        if not self._limits or not np.array_equal(self._limits[-1], force_limits):
-            self._limits.append(force_limits.copy())
-        else:
-            self._limits.append(self._limits[-1])
+        limits = force_limits.tobytes()  # equal bytes are kept once
+        self._limits.append(self._limits[-1] if self._limits and limits == self._limits[-1] else limits)
 
     def replay(self, data: mujoco.MjData) -> BareSteps:
         """Repeat the steps in a copy of the world: only the copies of the controls and `mj_step`.
@@ -53,10 +51,10 @@ class ControlTrace:
         """
         model, fresh, step = copy.copy(self._model), copy.copy(self._start), mujoco.mj_step
         limits_now, ctrl_now = model.actuator_forcerange, fresh.ctrl
-        limits_now[:] = self._limits[0] if self._limits else limits_now
-        # prepare the rows, and whether the limits change before them, outside the measured loop
+        # prepare the rows, and the limits if they change before them, outside the measured loop
+        arrays = {limits: np.frombuffer(limits).reshape(limits_now.shape) for limits in self._limits}
         work = [
-            (list(rows), limits if i == 0 or limits is not self._limits[i - 1] else None)
+            (list(rows), arrays[limits] if i == 0 or limits is not self._limits[i - 1] else None)
             for i, (rows, limits) in enumerate(zip(self._controls, self._limits, strict=True))
         ]
         cpu, began = time.process_time(), time.perf_counter()

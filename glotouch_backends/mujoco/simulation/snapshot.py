@@ -29,7 +29,7 @@ from glotouch_backends.mujoco.simulation.snapshot_check import (
 )
 from glotouch_bt.robot import BadInput, SafetyStop, Snapshot
 
-FORMAT = 5
+FORMAT = 6
 PARTS = ("_servo", "_jaws", "_wrist", "_guard", "_tactile", "_depth", "_taxels", "_reports", "proof", "true_force")
 FIXED: Mapping[str, frozenset[str]] = {
     "MujocoRobot": frozenset(
@@ -54,7 +54,10 @@ FIXED: Mapping[str, frozenset[str]] = {
             *("_rows", "_ctrl_now", "_sensed", "_external_now"),
         )
     ),
-    "Servo": frozenset(("_model", "_data", "_dof", "_arm_qpos", "_diagonal", "_names")),
+    "Servo": frozenset(
+        # the last three are views of the arrays that are kept
+        ("_model", "_data", "_dof", "_arm_qpos", "_diagonal", "_names", "_scaled", "_torques", "_of_arm")
+    ),
     "JawServo": frozenset(("_gripper", "_proof")),
     "WristSensor": frozenset(("_P_in_S", "_proof", "_gain_error", "_cross_talk", "_reach", "_jitter", "_calibrated")),
     "HardLimitGuard": frozenset(("_max_N", "_max_Nm", "_quiet_2", "_rise_s_m", "_samples_ahead", "tripped")),

@@ -19,7 +19,7 @@ class TrueForce:
 
     def note(self, squares: Array) -> None:
         """Take the squares (n,) of the force in the samples of one period, N^2."""
-        largest = float(squares.max())
+        largest = max(squares.tolist())
         self.peak_N = max(self.peak_N, largest**0.5)
         if largest <= self._limit_2:
             self._over_now = 0

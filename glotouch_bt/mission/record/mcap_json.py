@@ -71,7 +71,12 @@ def to_json(value: object, *, summarise: bool = False, depth: int = 0) -> Json:
 
 def dumps(value: object, *, summarise: bool = False) -> bytes:
     """Return `to_json(value)` as compact UTF-8 text."""
-    return json.dumps(to_json(value, summarise=summarise), separators=(",", ":"), allow_nan=False).encode()
+    return dumps_plain(to_json(value, summarise=summarise))
+
+
+def dumps_plain(plain: Json) -> bytes:
+    """Return the result of `to_json` as compact UTF-8 text."""
+    return json.dumps(plain, separators=(",", ":"), allow_nan=False).encode()
 
 
 def _array(a: np.ndarray[tuple[int, ...], np.dtype[np.generic]], summarise: bool) -> Json:

@@ -20,7 +20,7 @@ from mcap.writer import CompressionType, Writer
 from glotouch_bt.mission.record import mcap_plots as plots
 from glotouch_bt.mission.record.event_words import HIDDEN_EVENTS, event_tone, event_words
 from glotouch_bt.mission.record.mcap_chunks import RecordChunk
-from glotouch_bt.mission.record.mcap_json import dumps, to_json
+from glotouch_bt.mission.record.mcap_json import Json, dumps, dumps_plain, to_json
 from glotouch_bt.mission.record.mcap_packing import Column, pack
 from glotouch_bt.mission.record.mcap_robot import LinkFrames, robot_shapes
 from glotouch_bt.mission.record.mcap_scene import event_scene, registered_container, world_scene
@@ -116,7 +116,7 @@ class Recorder:
         self._message(stamp_s, EVENT_PREFIX + kind, {"kind": kind, "data": plain})
         if kind not in HIDDEN_EVENTS and isinstance(plain, dict):
             level = LOG_LEVELS[event_tone(kind)]
-            said = {
+            said: dict[str, Json] = {
                 "level": level,
                 "message": f"{kind}: {event_words(kind, plain)}",
                 "name": str(plain.get("node", "")),
@@ -178,9 +178,9 @@ class Recorder:
     def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
 
-    def _message(self, stamp_s: float, topic: str, body: dict[str, Any]) -> None:
+    def _message(self, stamp_s: float, topic: str, body: dict[str, Json]) -> None:
         sec, nsec = divmod(_ns(stamp_s), 10**9)
-        self._put(_ns(stamp_s), topic, dumps({"timestamp": {"sec": sec, "nsec": nsec}, **body}))
+        self._put(_ns(stamp_s), topic, dumps_plain({"timestamp": {"sec": sec, "nsec": nsec}, **body}))
 
     def _put(self, log_ns: int, topic: str, message: bytes) -> None:
         self._pending.append((max(log_ns, 0), self._channel(topic), message))  # MCAP times are unsigned

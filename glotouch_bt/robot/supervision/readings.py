@@ -15,16 +15,11 @@ from glotouch_bt.robot.command import Command
 from glotouch_bt.robot.geometry import Array
 from glotouch_bt.robot.interface import Robot
 from glotouch_bt.robot.observation import SAMPLED, Observation
+from glotouch_bt.robot.supervision import targets
 from glotouch_bt.robot.supervision.limits import GuardFinding, SupervisionLimits, TransientCounter
 from glotouch_bt.robot.supervision.response import WristResponseGuard
 from glotouch_bt.robot.supervision.signals import TactileSignalGuard, WrenchSignalGuard
-from glotouch_bt.robot.supervision.targets import (
-    MAX_NORM_ERROR,
-    NOWHERE,
-    angle_rad,
-    distance_to_path,
-    way_to_target,
-)
+from glotouch_bt.robot.supervision.targets import MAX_NORM_ERROR, NOWHERE, angle_rad, distance_to_path
 
 MAX_REST_SPEED_RAD_S = 0.01
 """A joint below this speed stands still. Source: ours."""
@@ -159,7 +154,7 @@ class ReadingsGuard:
     def _in_order(self, o: Observation) -> bool:
         """Return True if nothing is wrong: every sample in its range, and the newest pose at the newest target."""
         target = self._targets[-1] if self._targets else NOWHERE
-        away_m = way_to_target(
+        away_m = targets.way_to_target(  # the compiled function is put into its own module
             o.q, o.dq, o.position_B_P, o.quat_B_P, o.wrench_S, self._fast_limits, target, self._min_dot
         )
         if not 0.0 <= away_m <= MAX_LAG_M:
@@ -279,8 +274,8 @@ class ReadingsGuard:
         periods = max(1.0, (now_s - self._last_s) / self._period_s)
         if self._was_moving and periods > 1.0 + rules.held_periods:
             self._add_stop()
-        targets = [t.tolist() for t in self._targets]
-        away_m, before_m = distance_to_path(p, [t[:3] for t in targets]), self._away_m
+        recent = [t.tolist() for t in self._targets]
+        away_m, before_m = distance_to_path(p, [t[:3] for t in recent]), self._away_m
         self._away_m = away_m
         touches = self._pressing(o)
         max_m = min(rules.touching_m, rules.following_m) if touches else rules.following_m
@@ -295,7 +290,7 @@ class ReadingsGuard:
             if touches:
                 what += f" while it presses with {float(np.linalg.norm(o.wrench_S[-1, :3])):.0f} N"
             findings.append(GuardFinding("following", what, soon_m, max_m, now_s))
-        rad = min(angle_rad(q, t[3:]) for t in targets)
+        rad = min(angle_rad(q, t[3:]) for t in recent)
         if rad > rules.following_rad:
             what = (
                 f"the hand is turned by {rad:.3f} rad from how it was {told}; {rules.following_rad:.3f} rad are allowed"

@@ -83,29 +83,33 @@ def holds_of(model: TargetModel, com_m: Array, gripper: Gripper, lowest_m: float
         none = np.zeros((len(yaws), len(near), 0))
         return Holds(model.phi_rad[yaws], l, z, none, none, none, none)
     sides = (model.fine_m, mirrored(model.fine_m))
-    felt = [_felt(fine, yaws, near, heights, model, force_N) for fine in sides]
-    apart2 = sum((a - b) ** 2 for a, b in zip(felt[0].middle_m, felt[1].middle_m, strict=True))
-    along = l[None, :, None] + 0.5 * (felt[0].middle_m[0] + felt[1].middle_m[0]) - com_l[:, None, None]
-    above = z[None, None, :] + 0.5 * (felt[0].middle_m[1] + felt[1].middle_m[1]) - com_m[2]
-    lever2 = along**2 + (0.5 * above) ** 2
-    worth = 1.0 / ((1 + lever2 / LEVER_SCALE_M**2) * (1 + apart2 / OPPOSITE_M**2))
-    for side in felt:
-        worth = worth * side.area / (side.area + AREA_SCALE) / (1 + (side.slope / STEEP) ** 2)
     width = model.width_m[pick].astype(np.float64)
     middle = model.middle_m[pick].astype(np.float64)
     column = [_column(fine, yaws, near, heights, gripper, model) for fine in sides]
     opening = 2 * np.maximum(column[0] - middle, column[1] + middle)
-    on_pads = np.ones_like(worth, dtype=bool)
+    on_pads = np.ones_like(opening, dtype=bool)
     for reach, farthest in zip((model.reach_m, mirrored(model.reach_m)), column, strict=True):
         on_pads &= farthest - reach[pick] <= FINGER_M  # false where the pad meets nothing
-    possible = on_pads & (opening <= gripper.stroke_m)
-    worth = np.where(possible, _blurred(np.where(possible, np.nan_to_num(worth), 0.0)), 0.0)
-    return Holds(model.phi_rad[yaws], l, z, worth, width, middle, opening)
+    possible = np.nonzero(on_pads & (opening <= gripper.stroke_m))
+    yaw, shift, height = possible
+    felt = [_felt(fine, yaws[yaw], near[shift], heights[height], model, force_N) for fine in sides]
+    apart2 = sum((a - b) ** 2 for a, b in zip(felt[0].middle_m, felt[1].middle_m, strict=True))
+    along = l[shift] + 0.5 * (felt[0].middle_m[0] + felt[1].middle_m[0]) - com_l[yaw]
+    above = z[height] + 0.5 * (felt[0].middle_m[1] + felt[1].middle_m[1]) - com_m[2]
+    lever2 = along**2 + (0.5 * above) ** 2
+    rated = 1.0 / ((1 + lever2 / LEVER_SCALE_M**2) * (1 + apart2 / OPPOSITE_M**2))
+    for side in felt:
+        rated = rated * side.area / (side.area + AREA_SCALE) / (1 + (side.slope / STEEP) ** 2)
+    worth = np.zeros_like(opening)
+    worth[possible] = np.nan_to_num(rated)
+    blurred = np.zeros_like(opening)
+    blurred[possible] = _blurred(worth)[possible]
+    return Holds(model.phi_rad[yaws], l, z, blurred, width, middle, opening)
 
 
 @dataclass(frozen=True)
 class _Felt:
-    """Contact of one pad, arrays (yaws, shifts, heights); middle_m is (along x_P, up) from the pad's middle."""
+    """Contact of one pad in n holds, arrays (n,); middle_m is (along x_P, up) from the pad's middle."""
 
     area: Array
     middle_m: tuple[Array, Array]
@@ -113,13 +117,13 @@ class _Felt:
 
 
 def _felt(fine: Array32, yaws: Index, near: Index, heights: Index, model: TargetModel, force_N: float) -> _Felt:
-    """Return the contact of a gel in every window."""
+    """Return the contact of a gel in n windows, whose indices in the tables are (n,)."""
     rows, cols = FINE
-    windows = np.lib.stride_tricks.sliding_window_view(fine[yaws], (cols, rows), axis=(1, 2))
-    seen = windows[:, ::STRIDE, ::STRIDE][:, near][:, :, heights]  # (yaws, shifts, heights, cols, rows)
+    windows = np.lib.stride_tricks.sliding_window_view(fine, (cols, rows), axis=(1, 2))
+    seen = windows[yaws, STRIDE * near, STRIDE * heights]  # (n, cols, rows)
     top = seen.max(axis=(-2, -1), keepdims=True)
     relative = np.where(np.isfinite(seen), seen - np.where(np.isfinite(top), top, 0.0), -np.inf).astype(np.float32)
-    flat = relative.reshape(*relative.shape[:3], -1)
+    flat = relative.reshape(len(relative), -1)
     step_l, step_z = model.pad.window_m[0] / cols, model.pad.window_m[1] / rows
     depth = np.maximum(flat + gel_shift(flat, step_l * step_z, force_N, model.pad), 0.0).reshape(relative.shape)
     pressed = depth > 0.0

@@ -93,7 +93,7 @@ class ContactGuard:
         self._R_P_E = pose_E_P.rotation.T
         self._R_B_S: Array = np.eye(3)
         self._history: deque[tuple[Observation, Array]] = deque(maxlen=HISTORY_BLOCKS)
-        self._approach_B: Array | None = None
+        self._approach_B, self._directed = ANY_DIRECTION, approach_B is not None
         if approach_B is not None:
             a = frozen_array("approach_B", approach_B, (3,))
             norm = float(np.linalg.norm(a))
@@ -108,24 +108,32 @@ class ContactGuard:
             cutoff_Hz=params.sustained_Hz,
             sigmas=SUSTAINED_SIGMAS_RATIO * params.sigmas,
         )
-        self._rules = tuple(_SoftRule(p, baseline, self._fusion) for p in (params, slow))
+        filters = [LowPass(6, p.cutoff_Hz, p.rate_Hz) for p in (params, slow)]
+        limits = [
+            (p.directional_N, p.total_N, p.moment_Nm, p.sigmas * math.sqrt(f.noise_gain**2 + baseline.median_variance))
+            for p, f in zip((params, slow), filters, strict=True)
+        ]
+        self._filters, self._limits = np.array([f.coefficients for f in filters]), np.array(limits)
+        self._states, self._above = np.zeros((len(filters), 2, 6)), np.zeros(len(filters), dtype=np.int64)
+        self._smooth: Array = np.zeros(6)
         self._onset: Onset | None = None
 
     def __call__(self, observation: Observation) -> Onset | None:
         """Return the onset once one of the rules has tripped (always the same one), else None."""
         if self._onset is not None:
             return self._onset
-        residual = observation.wrench_S - self._zero
-        if self._inertial is not None:
-            residual -= self._inertial(observation)
-        self._history.append((observation, residual))
+        residual = np.zeros(observation.wrench_S.shape)
+        inertial = residual if self._inertial is None else self._inertial(observation)
         self._R_B_S = quat_to_matrix(observation.quat_B_P[-1]) @ self._R_P_E
-        approach_S = None if self._approach_B is None else self._approach_B @ self._R_B_S
-        for rule in self._rules:
-            tripped = rule.trip(residual, approach_S)
-            if tripped is not None:
-                self._onset = self._date(observation, *tripped)
-                break
+        approach_S = self._approach_B @ self._R_B_S if self._directed else ANY_DIRECTION
+        trip = _tripped(
+            observation.wrench_S, self._zero, inertial, approach_S, self._directed, self._fusion.gain,
+            self._fusion.covariance, self._filters, self._states, self._limits, self.params.consecutive, self._above,
+            residual, self._smooth,
+        )  # fmt: skip
+        self._history.append((observation, residual))
+        if trip >= 0:
+            self._onset = self._date(observation, trip, self._fusion.gain @ self._smooth)
         return self._onset
 
     def standing(self, observation: Observation) -> Onset | None:
@@ -147,7 +155,7 @@ class ContactGuard:
         quats = np.concatenate([b.quat_B_P for b, _ in self._history])
         raw = self._fusion(np.concatenate([r for _, r in self._history]))
         direction = force_S / np.linalg.norm(force_S)
-        if self._approach_B is not None:
+        if self._directed:
             direction = -(self._approach_B @ self._R_B_S)
         at = onset_index(raw @ direction, len(stamps) - len(o.stamp_s) + trip, self._fusion.sd_along(direction))
         stamp = float(np.interp(at, np.arange(len(stamps)), stamps)) - self.params.latency_s
@@ -163,73 +171,87 @@ class ContactGuard:
         )
 
 
-@compiled("f8[:, ::1]", "given f8[:, :]", "given f8[:, :]", "f8[::1]", "b1", "f8[::1]", "i8", "i8[::1]")
+@compiled(
+    "given f8[:, :]",
+    "given f8[:]",
+    "given f8[:, :]",
+    "given f8[:]",
+    "b1",
+    "given f8[:, :]",
+    "given f8[:, :]",
+    "f8[:, ::1]",
+    "f8[:, :, ::1]",
+    "f8[:, ::1]",
+    "i8",
+    "i8[::1]",
+    "f8[:, ::1]",
+    "f8[::1]",
+)
 def _tripped(
-    smooth: Array,
-    gain: Array,
-    covariance: Array,
+    wrench: Array,
+    zero: Array,
+    inertial: Array,
     approach: Array,
     directed: bool,
+    gain: Array,
+    covariance: Array,
+    filters: Array,
+    states: Array,
     limits: Array,
     consecutive: int,
     above: npt.NDArray[np.int64],
+    residual: Array,
+    smooth: Array,
 ) -> int:
-    """Return the sample at which the rule trips, or -1.
+    """Return the sample at which the first rule trips, or -1.
 
     Args:
-        smooth: (n, 6) filtered residual wrench in S.
-        gain, covariance: (3, 6), (3, 3) of `TipFusion`.
+        wrench: (n, 6) sensed in S.
+        zero, inertial: (6,), (n, 6) what it shows without contact.
         approach: (3,) direction of motion in S; only used if `directed`.
         directed: An opposing force is required.
-        limits: (4,) opposing force N, total force N, moment Nm, and standard deviations of the filtered force.
-        consecutive: Number of consecutive samples that trip the rule.
-        above: (1,) number of the newest samples in a row that satisfy it; updated.
+        gain, covariance: (3, 6), (3, 3) of `TipFusion`.
+        filters: (rules, 5) coefficients of `butterworth`.
+        states: (rules, 2, 6) of the filters; updated.
+        limits: (rules, 4) opposing force N, total force N, moment Nm, and standard deviations of the filtered force.
+        consecutive: Number of consecutive samples that trip a rule.
+        above: (rules,) number of the newest samples in a row that satisfy it; updated.
+        residual: (n, 6) filled with `wrench` without what it shows without contact.
+        smooth: (6,) filled with the filtered residual at the sample.
     """
-    directional, total, moment, sigmas = limits[0], limits[1], limits[2], limits[3]
-    sd = 0.0
+    sd_2, force = 0.0, np.zeros(3)
     for j in range(3):
         for k in range(3):
-            sd += approach[j] * covariance[j, k] * approach[k]
-    min_against = max(directional, sigmas * np.sqrt(sd))
-    force = np.zeros(3)
-    for i in range(len(smooth)):
-        square = against = variance = torque = 0.0
-        for j in range(3):
-            f = 0.0
-            for k in range(6):
-                f += gain[j, k] * smooth[i, k]
-            force[j] = f
-            square += f * f
-            against -= f * approach[j]
-            torque += smooth[i, 3 + j] ** 2
-        for j in range(3):
-            for k in range(3):
-                variance += force[j] * covariance[j, k] * force[k]
-        # Multiplying both sides of the threshold by the norm avoids a division by a norm that may be zero.
-        met = square > total**2 and square * square > sigmas**2 * variance
-        if directed:
-            met = against > min_against and (met or torque > moment**2)
-        above[0] = above[0] + 1 if met else 0
-        if above[0] >= consecutive:
-            return i
+            sd_2 += approach[j] * covariance[j, k] * approach[k]
+    for i in range(len(wrench)):
+        for k in range(6):
+            residual[i, k] = wrench[i, k] - zero[k] - inertial[i, k]
+    for rule in range(len(limits)):
+        directional, total, moment, sigmas = limits[rule, 0], limits[rule, 1], limits[rule, 2], limits[rule, 3]
+        b0, b1, b2, a1, a2 = filters[rule, 0], filters[rule, 1], filters[rule, 2], filters[rule, 3], filters[rule, 4]
+        min_against = max(directional, sigmas * np.sqrt(sd_2))
+        for i in range(len(wrench)):
+            for k in range(6):  # as in `LowPass`
+                smooth[k] = b0 * residual[i, k] + states[rule, 0, k]
+                states[rule, 0, k] = b1 * residual[i, k] - a1 * smooth[k] + states[rule, 1, k]
+                states[rule, 1, k] = b2 * residual[i, k] - a2 * smooth[k]
+            square = against = variance = torque = 0.0
+            for j in range(3):
+                f = 0.0
+                for k in range(6):
+                    f += gain[j, k] * smooth[k]
+                force[j] = f
+                square += f * f
+                against -= f * approach[j]
+                torque += smooth[3 + j] ** 2
+            for j in range(3):
+                for k in range(3):
+                    variance += force[j] * covariance[j, k] * force[k]
+            # Multiplying both sides of the threshold by the norm avoids a division by a norm that may be zero.
+            met = square > total**2 and square * square > sigmas**2 * variance
+            if directed:
+                met = against > min_against and (met or torque > moment**2)
+            above[rule] = above[rule] + 1 if met else 0
+            if above[rule] >= consecutive:
+                return i
     return -1
-
-
-class _SoftRule:
-    """The rule for one filter and its thresholds, over one move."""
-
-    def __init__(self, params: GuardParams, baseline: Baseline, fusion: TipFusion) -> None:
-        self._fusion, self._consecutive = fusion, params.consecutive
-        self._low_pass = LowPass(6, params.cutoff_Hz, params.rate_Hz)
-        sigmas = params.sigmas * math.sqrt(self._low_pass.noise_gain**2 + baseline.median_variance)
-        self._limits = np.array([params.directional_N, params.total_N, params.moment_Nm, sigmas])
-        self._above = np.zeros(1, dtype=np.int64)
-
-    def trip(self, residual_S: Array, approach_S: Array | None) -> tuple[int, Array] | None:
-        """Return the sample of this block (n, 6) at which the rule trips and the filtered force (3,) there, or None."""
-        smooth, fusion = self._low_pass(residual_S), self._fusion
-        approach, directed = (ANY_DIRECTION, False) if approach_S is None else (approach_S, True)
-        i = _tripped(
-            smooth, fusion.gain, fusion.covariance, approach, directed, self._limits, self._consecutive, self._above
-        )
-        return None if i < 0 else (i, fusion.gain @ smooth[i])

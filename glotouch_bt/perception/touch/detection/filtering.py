@@ -40,6 +40,9 @@ class LowPass:
         cutoff_Hz: -3 dB frequency.
         rate_Hz: Sampling rate; the cut-off must lie below half of it.
 
+    Attributes:
+        coefficients: b0, b1, b2, a1, a2; see `butterworth`.
+
     Raises:
         ParamError: A cut-off outside (0, rate / 2).
     """
@@ -48,12 +51,12 @@ class LowPass:
         if not 0 < cutoff_Hz < 0.5 * rate_Hz:
             raise ParamError("cutoff_Hz", cutoff_Hz, f"in (0, {0.5 * rate_Hz}), half the sampling rate")
         self.cutoff_Hz, self.rate_Hz = cutoff_Hz, rate_Hz
-        self._coefficients = butterworth(cutoff_Hz, rate_Hz)
+        self.coefficients = butterworth(cutoff_Hz, rate_Hz)
         self._state: Array = np.zeros((2, channels))
 
     def __call__(self, block: Array) -> Array:
         """Filter the next block (n, channels); keep the state for the following call."""
-        return _filtered(*self._coefficients, block, self._state)
+        return _filtered(*self.coefficients, block, self._state)
 
     @property
     def noise_gain(self) -> float:

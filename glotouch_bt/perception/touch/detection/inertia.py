@@ -73,20 +73,29 @@ def _inertial(acceleration: Array, mass_kg: float, com: Array) -> Array:
     return out
 
 
-@compiled("f8[::1]", "f8[:, ::1]", "f8", "f8[:, ::1]")
-def _bends(stamps: Array, places: Array, lag_s: float, out: Array) -> int:
-    """Fill `out` (n, 3) with the accelerations `lag_s` before the last n samples; return the last window's start.
+@compiled("f8[::1]", "f8[:, ::1]", "given f8[:]", "given f8[:, :]", "f8")
+def _bends(last_s: Array, last_m: Array, new_s: Array, new_m: Array, lag_s: float) -> tuple[Array, Array, Array]:
+    """Return the stamps and places to keep for the next block, and the accelerations (n, 3) in this one.
 
-    The second derivative of the least-squares parabola through a window: the values, weighted with x^2 made orthogonal
-    to 1 and x, over the norm of these weights; x are the stamps from their mean.
+    They are those `lag_s` before the new samples: the second derivative of the least-squares parabola through a window.
+    It is the sum of the values, weighted with x^2 made orthogonal to 1 and x, over the norm of these weights; x are
+    the stamps from their mean.
+
+    Args:
+        last_s, last_m: (m,), (m, 3) stamps and places kept of the blocks before.
+        new_s, new_m: (n,), (n, 3) of this block.
+        lag_s: See `MeasuredInertia`.
     """
-    n, nearest, first = len(out), 0, 0
+    m, n, nearest, first = len(last_s), len(new_s), 0, 0
+    stamps, places, out = np.zeros(m + n), np.zeros((m + n, 3)), np.zeros((n, 3))
+    stamps[:m], stamps[m:] = last_s, new_s
+    places[:m], places[m:] = last_m, new_m
     x, bow = np.zeros(NEAREST), np.zeros(NEAREST)
     for i in range(n):
-        at = stamps[len(stamps) - n + i] - lag_s
-        while nearest < len(stamps) - 1 and 0.5 * (stamps[nearest] + stamps[nearest + 1]) < at:
+        at = stamps[m + i] - lag_s
+        while nearest < m + n - 1 and 0.5 * (stamps[nearest] + stamps[nearest + 1]) < at:
             nearest += 1
-        first = min(max(nearest - NEAREST // 2, 0), len(stamps) - NEAREST)
+        first = min(max(nearest - NEAREST // 2, 0), m + n - NEAREST)
         mean = 0.0
         for k in range(NEAREST):
             mean += stamps[first + k] / NEAREST
@@ -103,7 +112,8 @@ def _bends(stamps: Array, places: Array, lag_s: float, out: Array) -> int:
             for k in range(NEAREST):
                 total += 2.0 * bow[k] / norm * (places[first + k, axis] - places[first, axis])
             out[i, axis] = total
-    return first
+    kept = max(0, first - NEAREST)
+    return stamps[kept:], places[kept:], out
 
 
 class MeasuredInertia:
@@ -130,11 +140,8 @@ class MeasuredInertia:
             before = NEAREST + math.ceil(self._lag_s / BEFORE_S)
             self._stamp_s = o.stamp_s[0] - BEFORE_S * np.arange(before, 0, -1)
             self._position_m = np.repeat(o.position_B_P[:1], before, axis=0)
-        stamps = np.concatenate([self._stamp_s, o.stamp_s])
-        places = np.concatenate([self._position_m, o.position_B_P])
-        acceleration: Array = np.zeros((len(o.stamp_s), 3))
-        last = _bends(stamps, places, self._lag_s, acceleration)
-        kept = max(0, last - NEAREST)
-        self._stamp_s, self._position_m = stamps[kept:], places[kept:]
+        self._stamp_s, self._position_m, acceleration = _bends(
+            self._stamp_s, self._position_m, o.stamp_s, o.position_B_P, self._lag_s
+        )
         acceleration_S = acceleration @ (quat_to_matrix(o.quat_B_P[-1]) @ self._R_P_E)
         return _inertial(acceleration_S, self._carried.mass_kg, self._carried.com_S_m)

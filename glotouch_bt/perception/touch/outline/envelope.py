@@ -18,12 +18,21 @@ CONTACT_M = 0.002
 def envelope(candidate: Candidate) -> Contour:
     """Return the smaller of the circle and the rectangle that contain all contact points and the fitted outline.
 
-    Few contacts leave gaps, and an outline omits protruding parts, so both are included.
+    Few contacts leave gaps, and an outline omits protruding parts, so both are included. The result is kept with the
+    candidate, of which it is asked at every contact.
 
     Returns:
         A Contour; its `residuals_m` are the signed distances of those points, never positive (rectangle: to its
         nearest side).
     """
+    kept = vars(candidate)
+    if "_envelope" not in kept:
+        kept["_envelope"] = _envelope(candidate)
+    found: Contour = kept["_envelope"]
+    return found
+
+
+def _envelope(candidate: Candidate) -> Contour:
     points = candidate.extent_K_m
     circle = _circle(points, candidate.contour.centre_K_m)
     box = _rectangle(points)
