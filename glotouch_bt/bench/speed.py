@@ -243,10 +243,11 @@ def quantiles_us(times_s: Sequence[float]) -> dict[str, float]:
 def summarise(trials: Sequence[SpeedTrial]) -> dict[str, Any]:
     """Return factors (median and range over trials), cycle times over all cycles, and a breakdown of the time.
 
-    Keys: realtime_factor, bare_factor (of the bare steps), over_physics; control_cycle_us (command to command),
-    robot_cycle_us, tick_us, record_us; breakdown_s, mean seconds a mission: `physics` (bare steps), `robot` (rest of
-    Robot.cycle), `tree`, `record`, `rest`; `open` and `report` are not part of the wall time; by_cpu, factors by
-    processor time; leaves_s (tree time by leaf); same_end_state; targets and whether they are met.
+    Keys: realtime_factor, bare_factor (of the bare steps), over_physics; mission_wall_s, wall time of one mission;
+    control_cycle_us (command to command), robot_cycle_us, tick_us, record_us; breakdown_s, mean seconds a mission:
+    `physics` (bare steps), `robot` (rest of Robot.cycle), `tree`, `record`, `rest`; `open` and `report` are not part of
+    the wall time; by_cpu, factors by processor time; leaves_s (tree time by leaf); same_end_state; targets and whether
+    they are met.
     """
     rows = [t.row for t in trials]
 
@@ -273,6 +274,7 @@ def summarise(trials: Sequence[SpeedTrial]) -> dict[str, Any]:
         "realtime_factor": realtime,
         "bare_factor": spread([r["bare_factor"] for r in rows]),
         "over_physics": over,
+        "mission_wall_s": spread([r["wall_s"] for r in rows]),
         "by_cpu": {
             "realtime_factor": spread([r["sim_s"] / r["cpu_s"] for r in rows]),
             "over_physics": spread([r["cpu_s"] / r["bare_cpu_s"] for r in rows]),

@@ -93,6 +93,7 @@ def test_a_study_of_known_durations(
     assert seen == [(3, 1, 2), (4, 2, 2)]
     assert found["realtime_factor"] == pytest.approx({"median": 5.0, "min": 5.0, "max": 5.0, "n": 2})
     assert found["over_physics"]["median"] == pytest.approx(2.0)
+    assert found["mission_wall_s"]["median"] == pytest.approx(0.060)
     assert found["bare_factor"]["median"] == pytest.approx(10.0)
     assert found["robot_cycle_us"] == {"p50": 2000.0, "p99": 2000.0, "max": 2000.0}
     assert found["tick_us"]["max"] == 0.0

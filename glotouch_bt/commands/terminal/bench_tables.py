@@ -107,6 +107,7 @@ def print_speed(summary: dict[str, Any], folder: Path) -> None:
     rows = [
         ("simulated time / wall time", span("realtime_factor"), verdict("realtime_factor")),
         ("wall time / bare steps", span("over_physics"), verdict("over_physics")),
+        ("wall time of a mission, s", span("mission_wall_s"), ""),
         ("simulated time / bare steps", span("bare_factor"), ""),
         ("simulated time / processor time", span("realtime_factor", summary["by_cpu"]), "differs from the"),
         (
