@@ -45,7 +45,7 @@ $(VENV): requirements.txt pyproject.toml
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $(VENV)
 
-# What follows is in the environment and goes with it; the environment's own time, which each file made in it changes, does not count.
+# These files are inside the environment and are deleted with it. Its folder is order-only: its time changes with every file made in it.
 $(VENV)/.dev: requirements.txt pyproject.toml requirements-dev.txt | $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.txt
 	touch $(VENV)/.dev

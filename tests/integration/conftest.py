@@ -12,7 +12,7 @@ from tests.skills.conftest import bench, found, things, tool, world  # noqa: F40
 
 BLOCK_M = (0.05, 0.04, 0.06)
 FIRST = "test_the_page_is_true"
-"""The tutorial, test of the longest chain of commands: one process would end with it while the others have nothing."""
+"""The tutorial, one of the longest tests. If it began last, the other processes would wait for it."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -195,8 +195,8 @@ def separated(
 ) -> tuple[Candidate, ...]:
     """Return the candidates with the contacts that are probably theirs; see `shared_out`.
 
-    One that turned out to be parts of others is left out. The top of one is unknown again if its former centre is
-    outside its new outline: another body was touched there.
+    A candidate whose contacts all belong to others is left out. A candidate's top becomes unknown again if its former
+    centre is outside the new outline, because another body was touched there.
 
     Args:
         candidates: All candidates.

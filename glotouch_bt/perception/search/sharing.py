@@ -122,6 +122,7 @@ class _Outlines:
     _depths: dict[frozenset[frozenset[int]], float] = field(default_factory=dict)
 
     def of(self, contacts: tuple[Contact, ...]) -> OutlineBelief:
+        """Return the outline of one body with these contacts."""
         return _outline(_Group(contacts), self.radius_m)
 
     def overlap_m(self, a: tuple[Contact, ...], b: tuple[Contact, ...]) -> float:
@@ -164,7 +165,7 @@ class _Outlines:
             if len(parts) == 2 and limit + MAX_NATS * len(parts[0]) < before + gain:
                 continue
             if sum(self.of(part).log_evidence for part in parts) <= before + gain:
-                continue  # overlaps only make it less; to find them takes as long as the inference of the outlines
+                continue  # overlaps can only lower it, and computing them costs as much as inferring the outlines
             if not all(self.is_plausible(part) for part in parts):
                 continue
             its = self.evidence(step, changed) - before

@@ -13,7 +13,7 @@ from glotouch_skills.common.hand.hand import glide
 BESIDE_M_S = 0.02
 """Speed of the fingers beside the object where space was felt to be free. The record can be wrong: at 0.05 m/s, an arm
 that stood out beside the felt space stopped the robot (`bench retrieve --conditions realistic`, nailong of seed 41003,
-71d5f16), and at 0.03 m/s another one did (25 N, `bench speed --trials 10 --seed 59180`, aa5cf689)."""
+71d5f16). At 0.03 m/s, the fingers met an object with 25 N (`bench speed --trials 10 --seed 59180`, aa5cf689)."""
 ABOVE_RATIO = 3.0
 """Speed above an object, where nothing else is known, over the slow speed. Source: ours."""
 OVER_TOP_M = 0.02

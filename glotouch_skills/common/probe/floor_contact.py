@@ -15,8 +15,8 @@ FLOOR_SEARCH_M = 0.005
 """Search for the floor down to this far below its nominal height."""
 RIM_M = 0.015
 """The descent is guarded from this height above the container's rim to this depth below it: the registration may be
-wrong by more than the distance to the walls. Where something may stand, all of it is: an object may be higher than the
-box. Source: ours."""
+wrong by more than the distance to the walls. Where something may stand, the whole descent is guarded: an object may be
+higher than the box. Source: ours."""
 GUARDED_FROM_M = 0.04
 """Height above the floor from which the descent is guarded: the probe may have sunk in the jaws by its handle."""
 GUARDED_M_S = 0.02
