@@ -9,6 +9,8 @@ from glotouch_bt.compiled import compiled
 from glotouch_bt.robot import Array, ParamError
 
 Indices = npt.NDArray[np.int64]
+PARALLEL_RAD = 1e-9
+"""Angle between neighbouring edges of a convex polygon below which they are one edge. Source: rounding."""
 FLAT_M2 = 1e-14
 """Twice the area of three neighbouring points of a hull up to which the middle one is no corner. Source: rounding."""
 
@@ -118,8 +120,8 @@ def minimum_rectangle(points_m: Array) -> tuple[Array, tuple[float, float], floa
 def shrunk_convex(hull_m: Array, by_m: float) -> Array:
     """Return the erosion of a convex polygon by `by_m`: corners (m, 2), counter-clockwise.
 
-    The intersection of the shifted half planes is the hull of their dual points about the centroid. If the centroid is
-    eroded too, return the centroid alone (1, 2).
+    The intersection of the shifted half planes is the hull of their dual points about the centroid. Parallel
+    neighbours among the edges have no corner. If the centroid is eroded too, return the centroid alone (1, 2).
     """
     middle = area_and_centroid(hull_m)[1]
     edge = np.roll(hull_m, -1, axis=0) - hull_m
@@ -133,8 +135,9 @@ def shrunk_convex(hull_m: Array, by_m: float) -> Array:
     dual = dual[star_hull(dual)]
     following = np.roll(dual, -1, axis=0)
     cross = dual[:, 0] * following[:, 1] - dual[:, 1] * following[:, 0]
-    step = following - dual
-    return np.asarray(middle + np.stack([step[:, 1], -step[:, 0]], axis=1) / cross[:, None])
+    turned = cross > PARALLEL_RAD * np.linalg.norm(dual, axis=1) * np.linalg.norm(following, axis=1)
+    step = (following - dual)[turned]
+    return np.asarray(middle + np.stack([step[:, 1], -step[:, 0]], axis=1) / cross[turned, None])
 
 
 def polygon_distance(polygon_m: Array, points_m: Array) -> Array:

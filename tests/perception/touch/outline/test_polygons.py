@@ -52,6 +52,16 @@ def test_shrinking_undoes_growing(seed, radius):
     np.testing.assert_allclose((left @ ring.T).max(0), (points @ ring.T).max(0), atol=1e-3 * radius + 1e-9)
 
 
+@given(st.floats(-3, 3), st.floats(0.05, 0.1), st.floats(0.02, 0.05), st.integers(2, 40))
+def test_collinear_points_on_the_sides_of_a_rectangle_change_nothing(angle, long, short, n):
+    """The rest of a rectangle is a rectangle; rounding turns the edges between points of one side against each other."""
+    corners = np.array([[0.0, 0], [long, 0], [long, short], [0, short]])
+    sides = [np.linspace(a, b, n, endpoint=False) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    left = shrunk_convex(turned(np.concatenate(sides), angle, [0.3, -0.2]), 0.006)
+    assert np.isfinite(left).all()
+    np.testing.assert_allclose(minimum_rectangle(left)[1], [long - 0.012, short - 0.012], rtol=1e-6)
+
+
 def test_small_polygon_shrinks_to_its_centroid():
     assert shrunk_convex(np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), 0.6).shape == (1, 2)
 
