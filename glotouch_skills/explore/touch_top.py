@@ -100,6 +100,9 @@ class TouchTop(Skill):
         self.height_m = height
         self.event("candidate", candidate=self.measured)  # the final record of this candidate, with its height
         self.event("top", candidate=candidate.index, height_m=height, touches=top.touches, passed=top.passed)
+        if low_m is not None:
+            doubt = f"the place {height * 1e3:.0f} mm high on candidate {candidate.index} may be a neighbour's"
+            self.event("note", text=f"{doubt}: then its top is at {low_m * 1e3:.0f} mm")
 
     def _low_top_m(self, top: Top) -> float | None:
         """Return the height of the first place touched, m, if a higher one may be on another candidate; else None."""

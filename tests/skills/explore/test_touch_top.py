@@ -221,6 +221,7 @@ def test_what_rises_beside_another_object_may_be_a_part_of_that(make, things, fo
     assert skill.measured.height_m == pytest.approx(TOP + 0.02, abs=1e-3)
     assert skill.measured.low_top_m == (pytest.approx(TOP, abs=1e-3) if doubtful else None)
     assert skill.measured.sure_top_m == pytest.approx(TOP if doubtful else TOP + 0.02, abs=1e-3)
+    assert any("may be a neighbour's" in e["text"] for e in b.of_kind("note")) is doubtful
 
 
 def test_a_chimney_at_the_edge_of_a_narrow_post(make, things) -> None:
