@@ -93,7 +93,7 @@ class RefineOutline(Skill):
                 f"candidate {before.index} was lost among others: what was traced is another one",
                 advice="it stands too near to them to be traced from the side",
             )
-        self.refined = replace(better, height_m=p.height_m, top_touched=False, low_top_m=None) if anew else better
+        self.refined = replace(better, height_m=p.height_m, top_touched=False) if anew else better
         moved = float(np.linalg.norm(traced.displaced_K_m))
         explorer.distrust_free_space(better.contour, moved)
         self.event("candidate", candidate=self.refined, moved_m=moved, ended=traced.ended, moves=traced.moves)

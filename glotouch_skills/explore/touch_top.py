@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from glotouch_bt.motion import FREE_M_S, Motion
-from glotouch_bt.perception.search import BallMove, BallOutcome, Top, TopPlan, TopRule, rounds, top_plan
-from glotouch_bt.perception.touch import Candidate, GuardParams, signed_distance
+from glotouch_bt.perception.search import BallMove, BallOutcome, TopPlan, TopRule, rounds, top_plan
+from glotouch_bt.perception.touch import Candidate, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool, Prober
@@ -23,11 +23,6 @@ RIM_INSET_M = 0.003
 INSET_SHARE = 0.3
 """Distance of the passes inside the outline over half its width: passes in the middle of a narrow object miss what
 stands at its edge. Source: ours."""
-RISE_M = 0.006
-"""Height above the first place touched from which a higher one may be on another body. Source: ours."""
-NEAR_M = 0.025
-"""Maximum distance of such a place from another candidate's outline. Source: ours; in recorded realistic missions of
-touching_five and clutter_ten, such places were often on another body up to about 20 mm, and hardly ever above 35 mm."""
 MIN_REACH_M = 0.003
 """Least distance of inner places from the passes of a narrow object. Source: ours; as the parameter `reach_m`."""
 
@@ -74,7 +69,6 @@ class TouchTop(Skill):
 
     tool = In(HeldTool, "the held probe")
     candidate = In(Candidate, "the object, as traced")
-    known = In(tuple, "all candidates", key="candidates", element=Candidate, required=False, expected=False)
     measured = Out(Candidate, "the same with its height", always=True)
     height_m = Out(float, "height of its top above the floor, m")
     gone = Out(bool, "nothing stands where it was traced", always=True)
@@ -95,23 +89,9 @@ class TouchTop(Skill):
                 sides_m=sides_m,
             )
         height = float(top.ball_K_m[2]) - tool.tip_radius_m - tool.floor_z_K_m
-        low_m = self._low_top_m(top)
-        self.measured = replace(candidate, height_m=height, top_touched=True, low_top_m=low_m)
-        self.height_m = height
+        self.measured, self.height_m = replace(candidate, height_m=height, top_touched=True), height
         self.event("candidate", candidate=self.measured)  # the final record of this candidate, with its height
         self.event("top", candidate=candidate.index, height_m=height, touches=top.touches, passed=top.passed)
-        if low_m is not None:
-            doubt = f"the place {height * 1e3:.0f} mm high on candidate {candidate.index} may be a neighbour's"
-            self.event("note", text=f"{doubt}: then its top is at {low_m * 1e3:.0f} mm")
-
-    def _low_top_m(self, top: Top) -> float | None:
-        """Return the height of the first place touched, m, if a higher one may be on another candidate; else None."""
-        tool = self.tool
-        if top.ball_K_m is None or top.first_K_m is None or top.ball_K_m[2] - top.first_K_m[2] < RISE_M:
-            return None
-        others = (c.contour for c in self.known or () if c.index != self.candidate.index)
-        away_m = min((float(signed_distance(o, top.ball_K_m[None, :2])[0]) for o in others), default=np.inf)
-        return None if away_m > NEAR_M else float(top.first_K_m[2]) - tool.tip_radius_m - tool.floor_z_K_m
 
     def _plan(self, candidate: Candidate, sides_m: float) -> TopPlan:
         p, tool = self.params, self.tool

@@ -212,7 +212,7 @@ def separated(
         elif contacts is not None:
             new = _with(c, contacts, outline_of(contacts, radius_m))
             elsewhere = float(signed_distance(new.contour, c.contour.centre_K_m[None])[0]) > 0.0
-            out.append(replace(new, top_touched=False, low_top_m=None) if elsewhere else new)
+            out.append(replace(new, top_touched=False) if elsewhere else new)
     return tuple(out)
 
 

@@ -58,13 +58,11 @@ class Top:
 
     Attributes:
         ball_K_m: (3,) ball centre at the contact from above; None without any contact.
-        first_K_m: (3,) ball centre at the first contact from above, in the middle or, if hollow, on the rim.
         touches: Number of contacts from above.
         passed: Fraction of the passes that was completed.
     """
 
     ball_K_m: Array | None
-    first_K_m: Array | None
     touches: int
     passed: float
 
@@ -204,8 +202,7 @@ def top_plan(
         if search.best is not None:
             break
     else:
-        return Top(None, None, 0, 0.0)
-    first = search.best
+        return Top(None, 0, 0.0)
     way = np.asarray(way_K_m, dtype=np.float64)
     done = 0
     for goal in way:
@@ -213,7 +210,7 @@ def top_plan(
     if search.best is not None and len(way) > 1:
         along = (way[1] - way[0]) / max(float(np.linalg.norm(way[1] - way[0])), 1e-9)
         yield from search.climb(along)
-    return Top(search.best, first, search.touches, done / max(len(way), 1))
+    return Top(search.best, search.touches, done / max(len(way), 1))
 
 
 LIFT_GROWTH = 3.0

@@ -111,7 +111,6 @@ class Candidate:
         quality: 0..1, certainty of the centre: 1/2 at a standard deviation of 5 mm (`search.candidates.quality`).
         contacts: Contacts with the object.
         top_touched: The top was touched.
-        low_top_m: Height of the top if the highest place touched is on another body, m; None: no other is near.
     """
 
     index: int
@@ -120,12 +119,6 @@ class Candidate:
     quality: float
     contacts: tuple[Contact, ...]
     top_touched: bool = True
-    low_top_m: float | None = None
-
-    @property
-    def sure_top_m(self) -> float:
-        """Height that the object surely has, m."""
-        return self.height_m if self.low_top_m is None else self.low_top_m
 
     def span_m(self, yaw_rad: float) -> tuple[float, float]:
         """Return (minimum, maximum) coordinate of contact points and outline along the direction `yaw_rad` in K."""

@@ -91,8 +91,7 @@ def layer_heights(candidate: Candidate, gripper: Gripper, p: ClosureParams) -> A
     would leave no spare.
     """
     lowest = lowest_pads_m(candidate.height_m, gripper)
-    top = candidate.sure_top_m
-    highest = max(top - p.top_overlap_m, min(lowest + p.layer_gap_m, top), lowest)
+    highest = max(candidate.height_m - p.top_overlap_m, min(lowest + p.layer_gap_m, candidate.height_m), lowest)
     least = 1 if highest - lowest < MIN_GAP_M else min(2, p.layers)
     count = int(np.clip(np.floor((highest - lowest) / p.layer_gap_m) + 1, least, p.layers))
     return np.linspace(lowest, highest, count)

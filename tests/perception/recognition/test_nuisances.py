@@ -54,21 +54,6 @@ def test_a_top_raised_by_a_lean_is_expected(solids) -> None:
     assert ratio(0.060) > 2.0
 
 
-def test_a_top_that_may_be_another_body_s_excludes_little(solids) -> None:
-    """With a probability of 0.35 the lower place is the top: the ratio is at most log 0.35 below that of a sure top."""
-    mesh = solids.box(0.080, 0.040, 0.034)
-    touched, _ = acquire(mesh, (0.0, 0.0, 0.3), IDEAL, np.random.default_rng(0))
-    model = TargetModel.from_mesh(mesh)
-
-    def ratio(height_m: float, low_top_m: float | None = None) -> float:
-        candidate = replace(touched.candidate, height_m=height_m, top_touched=True, low_top_m=low_top_m)
-        return height_ratio(model, candidate, PARAMS)
-
-    assert ratio(0.034) + math.log(0.35) <= ratio(0.050, 0.034) < ratio(0.034)
-    assert ratio(0.050, 0.034) > ratio(0.050) + 3.0
-    assert ratio(0.034, 0.020) == pytest.approx(ratio(0.034) + math.log(0.65), abs=0.1), "it is its own part"
-
-
 def test_the_height_of_leaning_objects_against_random_draws(solids) -> None:
     mesh = solids.box(0.080, 0.040, 0.060)
     touched, _ = acquire(mesh, (0.0, 0.0, 0.3), IDEAL, np.random.default_rng(0))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -169,14 +168,12 @@ POST, RADIUS, TOP = (0.02, -0.03), 0.028, 0.055
 
 @pytest.fixture
 def make(bench, things, tool, found):
-    def make_one(things_there, radius=RADIUS, known=(), **params):
+    def make_one(things_there, radius=RADIUS, **params):
         b = bench(things=[things.floor(), *things_there])
         b.arm.scene.hold_tool(True)
         above = np.array([POST[0], POST[1] + 0.05, 0.1])
         b.go(b.arm.joints(b.arm.kinematics.ik(tool.pose_B_P(b.world, above), b.arm.q)))
-        candidate = found.round(POST, radius, 0.02)
-        inputs = {"tool": tool, "candidate": candidate, "known": (candidate, *known)}
-        return b, b.make(TouchTop, inputs=inputs, **params)
+        return b, b.make(TouchTop, inputs={"tool": tool, "candidate": found.round(POST, radius, 0.02)}, **params)
 
     return make_one
 
@@ -208,20 +205,6 @@ def test_a_chimney_beside_the_middle(make, things) -> None:
     b.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
     assert skill.measured.height_m == pytest.approx(TOP + 0.02, abs=1e-3)
-
-
-@pytest.mark.parametrize(("away_m", "doubtful"), [(0.020, True), (0.060, False)])
-def test_what_rises_beside_another_object_may_be_a_part_of_that(make, things, found, away_m, doubtful) -> None:
-    """Its outline may reach over the other one: the height of its middle is kept as well."""
-    rise = (POST[0] + 0.018, POST[1])
-    other = replace(found.round((rise[0] + away_m + 0.02, POST[1]), 0.02, 0.02), index=7)
-    b, skill = make([things.post(POST, RADIUS, TOP), things.post(rise, 0.008, TOP + 0.02)], known=(other,))
-    b.run(skill)
-    assert skill.status is Status.SUCCESS, skill.feedback_message
-    assert skill.measured.height_m == pytest.approx(TOP + 0.02, abs=1e-3)
-    assert skill.measured.low_top_m == (pytest.approx(TOP, abs=1e-3) if doubtful else None)
-    assert skill.measured.sure_top_m == pytest.approx(TOP if doubtful else TOP + 0.02, abs=1e-3)
-    assert any("may be a neighbour's" in e["text"] for e in b.of_kind("note")) is doubtful
 
 
 def test_a_chimney_at_the_edge_of_a_narrow_post(make, things) -> None:

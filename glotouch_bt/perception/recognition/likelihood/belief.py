@@ -129,7 +129,7 @@ def ranked(belief: Belief) -> Ranking:
 def closure_options(touchset: TouchSet) -> list[Closure]:
     """Return closures through the contour's centre: across the sides of a box, from all sides of a round object."""
     c = touchset.candidate.contour
-    top = max(touchset.candidate.sure_top_m - TOP_OVERLAP_M, LOWEST_M)
+    top = max(touchset.candidate.height_m - TOP_OVERLAP_M, LOWEST_M)
     heights = np.linspace(LOWEST_M, top, OPTION_HEIGHTS if top > LOWEST_M + 0.01 else 1)
     if c.kind == "box":
         yaws = [c.yaw_rad, c.yaw_rad + 0.5 * math.pi]

@@ -41,8 +41,6 @@ class LikelihoodParams:
             in conditions/realistic.yaml, 0 to 8 deg in strong.yaml.
         height_lower: Probability that a lower point of a wholly traced object was measured as its top. Source: ours; in
             recorded realistic missions nearly all low tops were those of partly traced objects.
-        top_of_another: Probability that the highest place touched is on another body, if `Candidate.low_top_m` is set.
-            Source: ours; about a third in the missions named at `NEAR_M` of the skill `touch_top`.
         contour_sd_m: Standard deviation of a contour's side, besides that of the traces.
         contour_outlier: Probability that the contour covers only a part of the object.
         trace_outlier: Probability that a trace mixes the contacts of several objects, or of one before and after a
@@ -91,7 +89,6 @@ class LikelihoodParams:
     height_sd_m: float = 1.2e-3
     lean_rad: float = math.radians(3.0)
     height_lower: float = 0.03
-    top_of_another: float = 0.35
     contour_sd_m: float = 1.5e-3
     contour_outlier: float = 0.1
     trace_outlier: float = 0.03
@@ -123,7 +120,7 @@ class LikelihoodParams:
                 raise ParamError(f"likelihood.{f.name}", v, "odd, so that the grid contains zero")
         for name in (
             "width_outlier", "slip", "image_outlier", "image_alike", "relief_outlier", "height_lower",
-            "top_of_another", "contour_outlier", "trace_outlier", "prior_absent", "twin", "twin_width",
+            "contour_outlier", "trace_outlier", "prior_absent", "twin", "twin_width",
         ):  # fmt: skip
             if not 0 < getattr(self, name) < 1:
                 raise ParamError(f"likelihood.{name}", getattr(self, name), "between 0 and 1")

@@ -39,32 +39,20 @@ def mode_ratio(model: TargetModel, candidate: Candidate) -> float:
 def height_ratio(model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:
     """Return the log ratio of the measured top; 0 if not touched.
 
-    The highest place touched may be on another body; then the top is the lower one.
+    If the contour is that of the whole object, the top is the model's, seldom a lower point. If it covers a part, the
+    top is that of a part as well.
     """
     low, high = HEIGHTS_M
     if not candidate.top_touched:
         return 0.0
-    density = _top_density(candidate.height_m, model, candidate, p)
-    if candidate.low_top_m is not None:
-        other = _top_density(candidate.low_top_m, model, candidate, p)
-        density = (1 - p.top_of_another) * density + p.top_of_another * other
-    return math.log(0.99 * density * (high - low) + 0.01)
-
-
-def _top_density(height_m: float, model: TargetModel, candidate: Candidate, p: LikelihoodParams) -> float:
-    """Return the density of a measured top, 1/m.
-
-    If the contour is that of the whole object, the top is the model's, seldom a lower point. If it covers a part, the
-    top is that of a part as well.
-    """
     span = max(model.height_m - SENSING_M, 5e-3)
-    lower = 1 / span if SENSING_M <= height_m <= model.height_m else 0.0
-    *parts, top = _height_density(height_m - model.tops_m, model, p).tolist()
+    lower = 1 / span if SENSING_M <= candidate.height_m <= model.height_m else 0.0
+    *parts, top = _height_density(candidate.height_m - model.tops_m, model, p).tolist()
     whole = whole_share(model, candidate, p)
-    return float(
-        whole * ((1 - p.height_lower) * top + p.height_lower * lower)
-        + (1 - whole) * 0.5 * (sum(parts) / len(parts) + lower)
+    density = whole * ((1 - p.height_lower) * top + p.height_lower * lower) + (1 - whole) * 0.5 * (
+        sum(parts) / len(parts) + lower
     )
+    return math.log(0.99 * density * (high - low) + 0.01)
 
 
 def _height_density(off_m: Array, model: TargetModel, p: LikelihoodParams) -> Array:
