@@ -120,8 +120,8 @@ def minimum_rectangle(points_m: Array) -> tuple[Array, tuple[float, float], floa
 def shrunk_convex(hull_m: Array, by_m: float) -> Array:
     """Return the erosion of a convex polygon by `by_m`: corners (m, 2), counter-clockwise.
 
-    The intersection of the shifted half planes is the hull of their dual points about the centroid. Parallel
-    neighbours among the edges have no corner. If the centroid is eroded too, return the centroid alone (1, 2).
+    The intersection of the shifted half planes is the hull of their dual points about the centroid. Neighbouring edges
+    that are parallel have no corner between them. If the centroid is eroded too, return the centroid alone (1, 2).
     """
     middle = area_and_centroid(hull_m)[1]
     edge = np.roll(hull_m, -1, axis=0) - hull_m

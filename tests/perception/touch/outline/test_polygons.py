@@ -54,7 +54,7 @@ def test_shrinking_undoes_growing(seed, radius):
 
 @given(st.floats(-3, 3), st.floats(0.05, 0.1), st.floats(0.02, 0.05), st.integers(2, 40))
 def test_collinear_points_on_the_sides_of_a_rectangle_change_nothing(angle, long, short, n):
-    """A smaller rectangle is left, although rounding turns the edges between points of one side against each other."""
+    """A smaller rectangle is left, although rounding makes the edges along one side not quite parallel."""
     corners = np.array([[0.0, 0], [long, 0], [long, short], [0, short]])
     sides = [np.linspace(a, b, n, endpoint=False) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
     left = shrunk_convex(turned(np.concatenate(sides), angle, [0.3, -0.2]), 0.006)
