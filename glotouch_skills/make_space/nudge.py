@@ -1,4 +1,4 @@
-"""Push an object along the floor with the closed fingers, and know afterwards where it stands."""
+"""Push an object along the floor with the fingers, and know afterwards where it stands."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import FREE_M_S, Motion, finger_outline_half_m, hand_pose_B
+from glotouch_bt.motion import FREE_M_S, Motion, hand_pose_B
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD, MotionRefused, Pose
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import glide, keeping_clear_of, rise_clear, unfelt_paces
-from glotouch_skills.common.planning import Push, PushPlanner, after_push
+from glotouch_skills.common.planning import NEEDED_M, Push, PushPlanner, after_push, push_cost_m
 from glotouch_skills.make_space.push_guard import STABLE, TOUCHING_N, Felt, PushGuard, push_guard, standing_force_B_N
 
 MIN_FELT_N = 0.08
@@ -53,7 +53,10 @@ class NudgeParams(SkillParams):
         "Height of the fingertips above the floor: low, so that the object slides and does not topple",
         unit="m", default=0.006, ge=0.003, le=0.02,
     )  # fmt: skip
-    aperture_m: float = param("Opening of the jaws", unit="m", default=0.0, ge=0.0, le=0.01)
+    fork_m: float = param(
+        "Opening of the jaws where there is room for it: two fingertips keep a round object between them",
+        unit="m", default=0.03, ge=0.0, le=0.06,
+    )  # fmt: skip
     travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
     descent_speed_m_s: float = param(
         "Speed of the descent beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04
@@ -63,8 +66,9 @@ class NudgeParams(SkillParams):
 class Nudge(Skill):
     """Push one object along the floor: a stated way, or the shortest way that makes space for the fingers.
 
-    The flat side of the closed fingers pushes through the object's centre, low and slowly. The object slides with them,
-    so its touched edge is where they stop. A push that would topple it ends. Its position across the push, and the
+    The flat sides of the two fingers push through the object's centre, low and slowly: open, if there is room, so that
+    a round object cannot slip sideways, else closed. The object slides with them from where they meet it to where they
+    stop. A push that would topple it ends. Its position across the push, and the
     positions of what it passed closely, become less certain. The space is made for the first object of `cramped`; the
     pushed object may be a neighbour of it. With a stated distance, that object itself is pushed.
 
@@ -156,7 +160,7 @@ class Nudge(Skill):
             self.cramped = ()
             self._tell(push, felt, "left")
             raise self.LEFT(f"candidate {moving.index} was no longer felt before the end of the push")
-        moved = after_push(moving, push, felt.edge_m, self._half_m[1], felt.pushed_m)
+        moved = after_push(moving, push, felt.pushed_m, 0.0 if np.isnan(felt.early_m) else felt.early_m)
         shift_m = float((moved.contour.centre_K_m - moving.contour.centre_K_m) @ push.along_K)
         self.candidates = tuple(moved if c.index == moved.index else c for c in self.known)
         self._doubt(*push.near)
@@ -181,11 +185,6 @@ class Nudge(Skill):
             )
         self.cramped = ()
 
-    @property
-    def _half_m(self) -> tuple[float, float]:
-        half = finger_outline_half_m(self.context.arm.description.gripper, self.params.aperture_m)
-        return float(half[0]), float(half[1])
-
     def _plan(self) -> Motion[tuple[Candidate, Push]]:
         """Return the object that needs space and the push.
 
@@ -199,18 +198,24 @@ class Nudge(Skill):
             raise self.NO_PUSH("no candidate is said to lack space")
         half_extent = 0.5 * np.array(self.context.world.container.interior_m[:2])
         gripper = self.context.arm.description.gripper
-        planner = PushPlanner(self.known, half_extent, gripper, np.array(self._half_m))
+        planners = [PushPlanner(self.known, half_extent, gripper, opening) for opening in (p.fork_m, 0.0)]
         target = wanted[0]
         if p.distance_m > 0.0:
             side = target.contour.yaw_rad if p.from_long_side else 0.0
-            stated = planner.along(target, side + float(np.deg2rad(p.direction_deg)), p.distance_m)
-            if isinstance(stated, str):
-                raise self.NO_PUSH(f"candidate {target.index} cannot be pushed that way: {stated}")
-            return target, stated
+            stated = [a.along(target, side + float(np.deg2rad(p.direction_deg)), p.distance_m) for a in planners]
+            for push in stated:
+                if not isinstance(push, str):
+                    return target, push
+            raise self.NO_PUSH(f"candidate {target.index} cannot be pushed that way: {stated[-1]}")
         best: Push | None = None
-        for found in planner.for_space(target):
-            best = found
-            yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
+        for planner in planners:
+            found: Push | None = None
+            for found in planner.for_space(target):
+                yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
+            if found is not None and (best is None or push_cost_m(found) < push_cost_m(best)):
+                best = found
+            if best is not None and best.space_m >= NEEDED_M:
+                break
         if best is None:
             raise self.NO_PUSH(f"no push makes space for the fingers over candidate {target.index}")
         return target, best
@@ -225,7 +230,7 @@ class Nudge(Skill):
         tips = arm.description.gripper.fingertip_below_P_m
         low = hand_pose_B(arm, container, np.array([*push.start_K_m, p.height_m + tips]), push.yaw_K_rad)
         yield from rise_clear(arm)
-        yield from arm.jaws(p.aperture_m, speed_m_s=0.2)
+        yield from arm.jaws(push.opening_m, speed_m_s=0.2)
         high = Pose(np.array([*low.position_m[:2], float(arm.pose_B_P.position_m[2])]), low.quat)
         others = [c for c in self.known if c.index != moving.index]
         top_m = max(c.height_m for c in self.known)
@@ -245,7 +250,7 @@ class Nudge(Skill):
         with keeping_clear_of(arm, others), arm.pause_signal.finishing():
             way = push.approach_m + push.distance_m
             moved = yield from arm.shift(way * along_B, p.speed_m_s, guard=guard, what="push")
-            felt = yield from guard.at_rest(container, push, self._half_m[0], moved.stop is not None)
+            felt = yield from guard.at_rest(push, moved.stop is not None)
             yield from arm.shift(-RETREAT_M * along_B, p.speed_m_s, check=False, what="retreat")
         yield from rise_clear(arm)
         return felt

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from glotouch_bt.motion import Arm, Motion
-from glotouch_bt.robot import Array, Container, Observation
+from glotouch_bt.robot import Array, Observation
 from glotouch_skills.common.hand import STAND_S, UP_B
 from glotouch_skills.common.planning import Push
 
@@ -56,8 +56,8 @@ class Felt:
     """Result of a push.
 
     Attributes:
-        edge_m: Coordinate along the push, in K, of the fingers' pushing side at rest.
-        pushed_m: Distance the object moved, from the expected contact on; not negative.
+        pushed_m: Distance the object moved: from where it was met, or else from where it was expected, to where the
+            fingers stopped. Not negative.
         resistance_N: Mean resistance of the second half of the push.
         peak_N: Largest resistance of one control period.
         stopped: The resistance, or the tipping moment, ended the push.
@@ -66,7 +66,6 @@ class Felt:
         early_m: Distance by which the object was met earlier than traced; NaN if it was not met.
     """
 
-    edge_m: float
     pushed_m: float
     resistance_N: float
     peak_N: float
@@ -138,29 +137,26 @@ class PushGuard:
         felt = force[(force >= MIN_TIP_N) & (to_go > LEFT_FROM_M)]
         return bool(last.size and felt.size and last.mean() < LEFT_RATIO * np.median(felt))
 
-    def at_rest(self, container: Container, push: Push, half_m: float, stopped: bool) -> Motion[Felt]:
+    def at_rest(self, push: Push, stopped: bool) -> Motion[Felt]:
         """Stand still and return what was felt.
 
         Args:
-            container: Frame K.
             push: The push that has ended.
-            half_m: Distance of the pushing side from P.
             stopped: This guard has tripped.
         """
         blocks = yield from self.arm.hold(REST_S)
-        position_B = np.concatenate([b.position_B_P for b in blocks]).mean(axis=0)
-        place_K = container.pose_B_K.inverse().apply(position_B)[:2]
-        travelled = float((place_K - push.start_K_m) @ push.along_K)
+        stop = float(np.concatenate([b.position_B_P for b in blocks]).mean(axis=0) @ self.along_B)
+        expected = (self.along_m[0] if self.along_m else stop) + push.approach_m
+        met = self.met_m()
         pushing = self.resistance_N[int(len(self.resistance_N) * (1.0 - STEADY_SHARE)) :]
         return Felt(
-            edge_m=float(place_K @ push.along_K) + half_m,
-            pushed_m=max(travelled - push.approach_m, 0.0),
+            pushed_m=max(stop - (expected if math.isnan(met) else met), 0.0),
             resistance_N=float(np.mean(pushing)) if pushing else 0.0,
             peak_N=max(self.resistance_N, default=0.0),
             stopped=stopped,
             tipping=self.tipping,
             left=not stopped and self.has_left(),
-            early_m=push.approach_m - (self.met_m() - self.along_m[0]) if self.along_m else math.nan,
+            early_m=expected - met,
         )
 
 

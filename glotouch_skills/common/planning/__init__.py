@@ -17,6 +17,7 @@ from glotouch_skills.common.planning.push_plan import (
     PushPlanner,
     after_push,
     displaced,
+    push_cost_m,
     touched_edge_m,
 )
 from glotouch_skills.common.planning.squeeze_motion import (

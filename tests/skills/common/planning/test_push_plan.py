@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,15 +22,15 @@ from glotouch_skills.common.planning import (
     touched_edge_m,
 )
 from glotouch_skills.common.planning.finger_space import Rectangle, clearance_m, cramped_stances, gap_m
+from glotouch_skills.common.planning.push_plan import FOOT_SD_M, PLACE_SD_M
 from glotouch_skills.common.planning.touch_options import stances_over
 
 GRIPPER = RIZON4_XENSE.gripper
 HALF = np.array([0.15, 0.20])
-HAND = finger_outline_half_m(GRIPPER, 0.0)
 
 
 def planner(*candidates) -> PushPlanner:
-    return PushPlanner(candidates, HALF, GRIPPER, HAND)
+    return PushPlanner(candidates, HALF, GRIPPER)
 
 
 def last(pushes):
@@ -55,15 +56,38 @@ def test_a_corner_beside_the_centre_is_a_lever(found) -> None:
     assert isinstance(planner(thing).along(thing, math.radians(70), 0.02), str)
 
 
-@pytest.mark.parametrize("stop_m", [-0.010, 0.0, 0.022])
-def test_the_touched_edge_stands_where_the_fingers_stopped(found, stop_m: float) -> None:
+@pytest.mark.parametrize("early_m", [-0.004, 0.0, 0.006])
+def test_a_pushed_object_moves_from_where_it_was_met(found, early_m: float) -> None:
+    """Met early: between an object that stood nearer (and moved as far) and one with a foot (that moved farther)."""
     thing = found.box((0.0, 0.0), (0.06, 0.04))
     push = planner(thing).along(thing, 0.0, 0.03)
     assert isinstance(push, Push)
-    moved = after_push(thing, push, stop_m, float(HAND[1]), 0.03)
-    np.testing.assert_allclose(moved.contour.centre_K_m, [stop_m + 0.03, 0.0], atol=1e-9)
-    assert touched_edge_m(moved, 0.0, float(HAND[1]))[0] == pytest.approx(stop_m)
+    moved = after_push(thing, push, 0.025, early_m)
+    share = PLACE_SD_M**2 / (PLACE_SD_M**2 + FOOT_SD_M**2)
+    np.testing.assert_allclose(moved.contour.centre_K_m, [0.025 - share * early_m, 0.0], atol=1e-9)
     assert moved.quality < thing.quality
+
+
+def test_an_object_whose_place_is_uncertain_stands_where_it_was_met(found) -> None:
+    thing = found.box((0.0, 0.0), (0.06, 0.04))
+    thing = replace(thing, contour=replace(thing.contour, covariance=np.diag([0.02**2, 0.0, 0.0, 0.0, 0.0])))
+    push = planner(thing).along(thing, 0.0, 0.03)
+    assert isinstance(push, Push)
+    moved = after_push(thing, push, 0.025, 0.006)
+    np.testing.assert_allclose(moved.contour.centre_K_m, [0.019, 0.0], atol=2e-4)
+
+
+@pytest.mark.parametrize(("radius_m", "fits"), [(0.033, True), (0.020, False)])
+def test_the_fork_holds_a_wide_object_only(found, radius_m: float, fits: bool) -> None:
+    """The corners of the open fingers touch a circle where its chord is as long as the gap."""
+    thing = found.round((0.0, 0.0), radius_m)
+    push = PushPlanner([thing], HALF, GRIPPER, 0.03).along(thing, 0.0, 0.03)
+    assert isinstance(push, Push) == fits
+    if fits:
+        radius = 0.5 * float(np.ptp(Neighbour.of(thing).points_K_m[:, 0]))
+        edge, lever = touched_edge_m(thing, 0.0, float(finger_outline_half_m(GRIPPER, 0.03)[1]), 0.03)
+        assert edge == pytest.approx(-math.sqrt(radius**2 - 0.015**2), abs=1e-3)
+        assert lever < 0.002
 
 
 def test_a_displacement_carries_contacts_and_outline_along(found) -> None:
