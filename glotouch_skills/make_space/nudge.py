@@ -210,7 +210,8 @@ class Nudge(Skill):
         best: Push | None = None
         for planner in planners:
             found: Push | None = None
-            for found in planner.for_space(target):
+            for better in planner.for_space(target):
+                found = better
                 yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
             if found is not None and (best is None or push_cost_m(found) < push_cost_m(best)):
                 best = found
@@ -265,6 +266,7 @@ class Nudge(Skill):
             "nudge",
             candidate=push.candidate,
             direction_deg=direction_deg,
+            opening_m=push.opening_m,
             asked_m=push.distance_m,
             pushed_m=felt.pushed_m,
             resistance_N=felt.resistance_N,

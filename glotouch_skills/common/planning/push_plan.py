@@ -1,8 +1,8 @@
 """Pushes along the floor: which object to push, from where and how far, and where it stands afterwards.
 
-Planar and quasi-static, in K. The fingers are a rectangle whose flat side pushes along its normal, or, open, a fork with
-two such sides. The object slides with them, and its touched edge stays there (Mason, Mechanics of Robotic Manipulation,
-2001, section 7.2).
+Planar and quasi-static, in K. The fingers are a rectangle whose flat side pushes along its normal; open, they are a
+fork with two such sides. The object slides with them, and its touched edge stays there (Mason, Mechanics of Robotic
+Manipulation, 2001, section 7.2).
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ GRAZE_COST_M = 0.010
 OVERLAP_M = 0.008
 """Least length by which an object reaches beyond the gap of the fork on each side. Source: ours."""
 ALONG_SD_M = 0.001
-"""Standard deviation of the displacement along the push. Of 46 pushes (`bench space`, realistic, seeds 57000-57011): 0.9
-mm."""
+"""Standard deviation of the displacement along the push. Of 46 pushes (`bench space`, realistic, seeds 57000-57011):
+0.9 mm."""
 PLACE_SD_M = 0.0015
 """Standard deviation of a traced centre along a push, in the same pushes."""
 FOOT_SD_M = 0.002
