@@ -39,7 +39,9 @@ MIN_TIP_N = 0.15
 """Least resistance for which the ratio is judged. The noise of a mean over `TIP_S` is 0.005 N; the wrist's offset in
 motion is up to 0.1 N."""
 MET_S = 0.1
-"""Time over which the median resistance shows that the object was met: a start of the hand is felt for half of it."""
+"""Time over which the median resistance shows that the object was met. Source: ours."""
+STARTED_M = 0.002
+"""Way after which the hand no longer accelerates. Until then, its inertia alone is felt with up to 0.2 N."""
 LEFT_FROM_M = 0.006
 """Distance before the stop from which the resistance shows whether the object is still there. Source: ours."""
 LEFT_TO_M = 0.002
@@ -123,11 +125,12 @@ class PushGuard:
 
     def met_m(self) -> float:
         """Return the coordinate of P along the push where the object was met; NaN if it was not."""
-        force, n = np.array(self.resistance_N), round(MET_S / self.arm.period_s)
+        force, along, n = np.array(self.resistance_N), np.array(self.along_m), round(MET_S / self.arm.period_s)
         if len(force) < n:
             return math.nan
         felt = np.median(np.lib.stride_tricks.sliding_window_view(force, n), axis=1) >= MIN_TIP_N
-        met = np.flatnonzero(felt & (force[: len(felt)] >= MIN_TIP_N))
+        at_speed = along[: len(felt)] >= along[0] + STARTED_M
+        met = np.flatnonzero(felt & (force[: len(felt)] >= MIN_TIP_N) & at_speed)
         return self.along_m[int(met[0])] if met.size else math.nan
 
     def has_left(self) -> bool:
