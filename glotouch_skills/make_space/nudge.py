@@ -198,7 +198,7 @@ class Nudge(Skill):
             raise self.NO_PUSH("no candidate is said to lack space")
         half_extent = 0.5 * np.array(self.context.world.container.interior_m[:2])
         gripper = self.context.arm.description.gripper
-        planners = [PushPlanner(self.known, half_extent, gripper, opening) for opening in (p.fork_m, 0.0)]
+        planners = [PushPlanner(self.known, half_extent, gripper, opening) for opening in (p.fork_m, 0.6 * p.fork_m, 0.0)]
         target = wanted[0]
         if p.distance_m > 0.0:
             side = target.contour.yaw_rad if p.from_long_side else 0.0

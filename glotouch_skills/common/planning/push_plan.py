@@ -59,7 +59,10 @@ MAY_TOUCH_M = 0.002
 """Objects that a pushed one passes at less than this may have been moved: the error of two outlines. Source: ours."""
 GRAZE_COST_M = 0.010
 """Longer push that is preferred to one that passes another object at less than `MAY_TOUCH_M`."""
-OVERLAP_M = 0.008
+UNEVEN_M = 0.004
+"""Largest distance, along the push, between the edges that the two fingers of the fork touch: the object turns until
+both touch it. Source: ours."""
+OVERLAP_M = 0.006
 """Least length by which an object reaches beyond the gap of the fork on each side. Source: ours."""
 ALONG_SD_M = 0.001
 """Standard deviation of the displacement along the push. Of 46 pushes (`bench space`, realistic, seeds 57000-57011):
@@ -109,7 +112,8 @@ def touched_edge_m(
     """Return the coordinate along a push of the edge that the fingers touch, and the push's lever about the centre.
 
     The fingers are centred on the object. The lever is the distance, across the push, from the object's centre to what
-    they touch; zero if it lies within, infinite if they touch nothing.
+    they touch; zero if it lies within. Two fingers apart hold an object that they touch almost at the same time: the
+    lever is zero, too. It is infinite if a finger touches nothing.
 
     Args:
         candidate: The object.
@@ -121,12 +125,15 @@ def touched_edge_m(
     centre = candidate.contour.centre_K_m
     points = np.concatenate([candidate.extent_K_m, sampled(candidate.contour.outline_K_m(90))])
     along, across = points @ u, (points - centre) @ np.array([-u[1], u[0]])
-    before = (np.abs(across) <= half_width_m) & (np.abs(across) >= 0.5 * gap_m)
-    if not before.any():
-        return float(centre @ u), math.inf
-    edge = float(along[before].min())
+    before = np.abs(across) <= half_width_m
+    if gap_m > 0.0:
+        edges = [along[before & (side * across >= 0.5 * gap_m)].min(initial=math.inf) for side in (1.0, -1.0)]
+        first, then = float(min(edges)), float(max(edges))
+        return first, 0.0 if then - first <= UNEVEN_M else math.inf if math.isinf(then) else 0.5 * gap_m
+    edge = float(along[before].min()) if before.any() else float(centre @ u)
     patch = across[before & (along <= edge + PATCH_M)]
-    return edge, max(float(patch.min()), -float(patch.max()), 0.0)
+    low, high = (float(patch.min()), float(patch.max())) if patch.size else (0.0, 0.0)
+    return edge, max(low, -high, 0.0)
 
 
 def displaced(candidate: Candidate, shift_K_m: Array, yaw_K_rad: float = 0.0, along_sd_m: float = 0.0,
