@@ -25,6 +25,8 @@ RETREAT_M = 0.006
 EARLY_M = 0.005
 """An object that is met this much earlier or later than it was traced may stand elsewhere: the probe moved it, or it
 has a low foot. Of 22 pushes of `bench space` (realistic), 21 met the object within 4 mm."""
+NARROW_SHARE = 0.6
+"""Opening for objects that are too narrow for `fork_m`, as a share of it. Source: ours."""
 SHORT_M = 0.001
 """A push that was stopped this much before its end counts as complete: the hand is decelerating. Source: ours."""
 HEAD = ("object", "direction, deg", "pushed, mm", "resistance, N", "peak, N", "end")
@@ -198,7 +200,8 @@ class Nudge(Skill):
             raise self.NO_PUSH("no candidate is said to lack space")
         half_extent = 0.5 * np.array(self.context.world.container.interior_m[:2])
         gripper = self.context.arm.description.gripper
-        planners = [PushPlanner(self.known, half_extent, gripper, opening) for opening in (p.fork_m, 0.6 * p.fork_m, 0.0)]
+        openings = (p.fork_m, NARROW_SHARE * p.fork_m, 0.0)
+        planners = [PushPlanner(self.known, half_extent, gripper, opening) for opening in openings]
         target = wanted[0]
         if p.distance_m > 0.0:
             side = target.contour.yaw_rad if p.from_long_side else 0.0

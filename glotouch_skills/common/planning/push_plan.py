@@ -68,7 +68,7 @@ ALONG_SD_M = 0.001
 """Standard deviation of the displacement along the push. Of 46 pushes (`bench space`, realistic, seeds 57000-57011):
 0.9 mm."""
 PLACE_SD_M = 0.0015
-"""Standard deviation of a traced centre along a push, in the same pushes."""
+"""Standard deviation of a traced centre along a push, in the same pushes: 1.5 mm."""
 FOOT_SD_M = 0.002
 """Standard deviation of the edge that the low fingers meet against the traced one, which is higher, in the same
 pushes."""
