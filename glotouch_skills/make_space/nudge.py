@@ -200,7 +200,7 @@ class Nudge(Skill):
             raise self.NO_PUSH("no candidate is said to lack space")
         half_extent = 0.5 * np.array(self.context.world.container.interior_m[:2])
         gripper = self.context.arm.description.gripper
-        openings = (p.fork_m, NARROW_SHARE * p.fork_m, 0.0)
+        openings = dict.fromkeys((p.fork_m, NARROW_SHARE * p.fork_m, 0.0))
         planners = [PushPlanner(self.known, half_extent, gripper, opening) for opening in openings]
         target = wanted[0]
         if p.distance_m > 0.0:

@@ -129,7 +129,9 @@ def touched_edge_m(
     if gap_m > 0.0:
         edges = [along[before & (side * across >= 0.5 * gap_m)].min(initial=math.inf) for side in (1.0, -1.0)]
         first, then = float(min(edges)), float(max(edges))
-        return first, 0.0 if then - first <= UNEVEN_M else math.inf if math.isinf(then) else 0.5 * gap_m
+        if math.isinf(then):
+            return first, math.inf
+        return first, 0.0 if then - first <= UNEVEN_M else 0.5 * gap_m
     edge = float(along[before].min()) if before.any() else float(centre @ u)
     patch = across[before & (along <= edge + PATCH_M)]
     low, high = (float(patch.min()), float(patch.max())) if patch.size else (0.0, 0.0)
