@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from glotouch_bt.perception.search import SearchMap, left_in_words, policy_names, search_policy, seek_next
+from glotouch_bt.perception.search import LEFT_BELOW, SearchMap, left_in_words, policy_names, search_policy, seek_next
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
@@ -28,7 +28,7 @@ class GuardedSweepParams(SkillParams):
     )
     left_below: float = param(
         "With an unknown number: the search ends when the chance that something is left is below this",
-        default=0.05, gt=0.0, lt=1.0,
+        default=LEFT_BELOW, gt=0.0, lt=1.0,
     )  # fmt: skip
     policy: PolicyName = param(
         "How to choose the next place: most expected finds for the distance, or one of the paper's two policies",

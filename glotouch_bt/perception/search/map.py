@@ -42,8 +42,10 @@ WALL_M = 0.003
 """Maximum distance from a wall of a contact with it. Source: ours; no object is as thin."""
 WALL_COSINE = 0.9
 """Minimum cosine between the force on the ball and the wall's normal for the contact to be with the wall."""
-LEFT_BELOW = 0.05
-"""Default chance that something is left below which the search for an unknown number of objects is complete."""
+LEFT_BELOW = 0.03
+"""Default chance that something is left below which the search for an unknown number of objects is complete. At 0.05,
+the search found everything in 93 % of 300 planar layouts, with a known number in 97 % (`bench search --count unknown
+--planar 300 --seed 64000`, 79ab0f05)."""
 Mask = npt.NDArray[np.bool_]
 
 
