@@ -12,6 +12,7 @@ from glotouch_bt.robot import HOLD, MotionRefused, Pose
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import glide, keeping_clear_of, rise_clear, unfelt_paces
 from glotouch_skills.common.planning import NEEDED_M, Push, PushPlanner, after_push, push_cost_m
+from glotouch_skills.make_space.centring import CENTRED_SD_M, centred
 from glotouch_skills.make_space.push_guard import STABLE, TOUCHING_N, Felt, PushGuard, push_guard, standing_force_B_N
 
 MIN_FELT_N = 0.08
@@ -59,6 +60,9 @@ class NudgeParams(SkillParams):
         "Opening of the jaws where there is room for it: two fingertips keep a round object between them",
         unit="m", default=0.03, ge=0.0, le=0.06,
     )  # fmt: skip
+    centre: bool = param(
+        "Close the jaws on the object once, across the push: it may have turned and moved aside", default=True
+    )
     travel_speed_m_s: float = param("Speed above the objects", unit="m/s", default=0.25, gt=0.0, le=0.25)
     descent_speed_m_s: float = param(
         "Speed of the descent beside the object", unit="m/s", default=0.010, gt=0.0, le=0.04
@@ -70,9 +74,10 @@ class Nudge(Skill):
 
     The flat sides of the two fingers push through the object's centre, low and slowly: open, if there is room, so that
     a round object cannot slip sideways, else closed. The object slides with them from where they meet it to where they
-    stop. A push that would topple it ends. Its position across the push, and the
-    positions of what it passed closely, become less certain. The space is made for the first object of `cramped`; the
-    pushed object may be a neighbour of it. With a stated distance, that object itself is pushed.
+    stop. Then the jaws close on it once, across the push, which centres it. Without that (`centre: false`, or no room),
+    its position across the push becomes less certain. So do the positions of what it passed closely. A push that would
+    topple it ends. The space is made for the first object of `cramped`; the pushed object may be a neighbour of it.
+    With a stated distance, that object itself is pushed.
 
     SUCCESS: it was pushed all the way; `candidates` has its new position, and its touches are given up.
     """
@@ -162,7 +167,7 @@ class Nudge(Skill):
             self.cramped = ()
             self._tell(push, felt, "left")
             raise self.LEFT(f"candidate {moving.index} was no longer felt before the end of the push")
-        moved = after_push(moving, push, felt.pushed_m, 0.0 if np.isnan(felt.early_m) else felt.early_m)
+        moved = yield from self._after(moving, push, felt)
         shift_m = float((moved.contour.centre_K_m - moving.contour.centre_K_m) @ push.along_K)
         self.candidates = tuple(moved if c.index == moved.index else c for c in self.known)
         self._doubt(*push.near)
@@ -258,6 +263,18 @@ class Nudge(Skill):
             yield from arm.shift(-RETREAT_M * along_B, p.speed_m_s, check=False, what="retreat")
         yield from rise_clear(arm)
         return felt
+
+    def _after(self, moving: Candidate, push: Push, felt: Felt) -> Motion[Candidate]:
+        """Return the pushed object where it stands, which the jaws feel across the push."""
+        early_m = 0.0 if np.isnan(felt.early_m) else felt.early_m
+        if self.params.centre:
+            moved = after_push(moving, push, felt.pushed_m, early_m, CENTRED_SD_M)
+            with keeping_clear_of(self.context.arm, [c for c in self.known if c.index != moving.index]):
+                standing, why_not = yield from centred(self.context, moved, push.yaw_K_rad)
+            if standing is not None:
+                return standing
+            self.event("note", text=f"the jaws did not feel where candidate {moving.index} stands: {why_not}")
+        return after_push(moving, push, felt.pushed_m, early_m)
 
     def _doubt(self, *indices: int) -> None:
         self.doubtful = tuple(sorted({*self.doubtful, *indices}))

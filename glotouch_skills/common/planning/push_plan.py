@@ -63,8 +63,8 @@ UNEVEN_M = 0.002
 """Largest distance, along the push, between the edges that the two fingers of the fork touch: the object turns until
 both touch it. Source: ours."""
 OVERLAP_M = 0.014
-"""Least length by which an object reaches beyond the gap of the fork on each side. With 6 mm, a train that was pushed at
-its rounded end turned and moved up to 7 mm across (`bench space`, realistic, seeds 57085 and 57089)."""
+"""Least length by which an object reaches beyond the gap of the fork on each side. With 6 mm, a train that was pushed
+at its rounded end turned and moved up to 7 mm across (`bench space`, realistic, seeds 57085 and 57089)."""
 ALONG_SD_M = 0.001
 """Standard deviation of the displacement along the push. Of 46 pushes (`bench space`, realistic, seeds 57000-57011):
 0.9 mm."""
@@ -171,7 +171,9 @@ def displaced(candidate: Candidate, shift_K_m: Array, yaw_K_rad: float = 0.0, al
     return replace(candidate, contour=moved, contacts=contacts, quality=quality)
 
 
-def after_push(candidate: Candidate, push: Push, moved_m: float, early_m: float) -> Candidate:
+def after_push(
+    candidate: Candidate, push: Push, moved_m: float, early_m: float, across_sd_m: float | None = None
+) -> Candidate:
     """Return the pushed object, from where it was met and where the fingers stopped.
 
     It moved from the one place to the other. One that was met early or late stood elsewhere than traced, or its foot
@@ -182,13 +184,15 @@ def after_push(candidate: Candidate, push: Push, moved_m: float, early_m: float)
         push: The push.
         moved_m: Distance between the two places.
         early_m: Distance by which it was met earlier than traced.
+        across_sd_m: Standard deviation of its place across the push; None: `ACROSS_SD`.
     """
     covariance = candidate.contour.covariance
     known = float(push.along_K @ covariance[:2, :2] @ push.along_K) if covariance.size else 0.0
     variance = max(known, PLACE_SD_M**2)
     stood_m = -early_m * variance / (variance + FOOT_SD_M**2)
     shift = (stood_m + moved_m) * push.along_K
-    return displaced(candidate, shift, push.yaw_K_rad, ALONG_SD_M, ACROSS_SD * moved_m)
+    across_sd_m = ACROSS_SD * moved_m if across_sd_m is None else across_sd_m
+    return displaced(candidate, shift, push.yaw_K_rad, ALONG_SD_M, across_sd_m)
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,7 +47,7 @@ def make(bench, found):
         b = bench(tip_P_m=0.115, things=[friction(force_N, blocked_from_m, lift_N, left_from_m), *foot])
         thing = found.box((at_m, 0.0), (0.06, 0.04), yaw_rad, height_m=top_m)
         given = {"known": (thing, *others), "cramped_before": cramped}
-        return b, b.make(Nudge, inputs=given, **{"distance_m": 0.03, "direction_deg": 0.0, **params})
+        return b, b.make(Nudge, inputs=given, **{"distance_m": 0.03, "direction_deg": 0.0, "centre": False, **params})
 
     return make_one
 
