@@ -42,9 +42,14 @@ def make(bench, found):
         yaw_rad=0.0,
         at_m=0.0,
         top_m=0.05,
+        grip_width_m=None,
         **params,
     ):
-        b = bench(tip_P_m=0.115, things=[friction(force_N, blocked_from_m, lift_N, left_from_m), *foot])
+        b = bench(
+            tip_P_m=0.115,
+            grip_width_m=grip_width_m,
+            things=[friction(force_N, blocked_from_m, lift_N, left_from_m), *foot],
+        )
         thing = found.box((at_m, 0.0), (0.06, 0.04), yaw_rad, height_m=top_m)
         given = {"known": (thing, *others), "cramped_before": cramped}
         return b, b.make(Nudge, inputs=given, **{"distance_m": 0.03, "direction_deg": 0.0, "centre": False, **params})
@@ -62,6 +67,19 @@ def test_the_object_stands_where_the_fingers_stopped(make) -> None:
     assert b.of_kind("nudge")[0]["resistance_N"] == pytest.approx(0.7, abs=0.1)
     assert b.of_kind("report")[0]["title"] == "Pushes"
     assert float(b.arm.pose_B_P.position_m[2]) > -0.2 + 0.14
+
+
+@pytest.mark.parametrize(("grip_width_m", "felt"), [(0.04, True), (None, False)])
+def test_the_jaws_close_on_the_pushed_object_across_the_push(make, grip_width_m: float | None, felt: bool) -> None:
+    b, skill = make(centre=True, grip_width_m=grip_width_m)
+    b.run(skill)
+    assert skill.status is Status.SUCCESS, skill.feedback_message
+    (moved,) = skill.candidates
+    np.testing.assert_allclose(moved.contour.centre_K_m, [0.03, 0.0], atol=1e-3)
+    without, other = make()
+    without.run(other)
+    assert (moved.quality > other.candidates[0].quality) == felt
+    assert any("did not feel" in n["text"] for n in b.of_kind("note")) != felt
 
 
 def test_a_direction_may_be_counted_from_the_long_side(make) -> None:
