@@ -5,8 +5,8 @@ its swath. Beam search over straight legs between lattice nodes maximises the we
 to it (a surrogate of expected search time; Stone, Theory of Optimal Search, 1975). Only the first two legs are executed
 before replanning.
 
-With an unknown number of objects the whole floor must be searched, for small objects too. The order hardly matters
-then, and `NearestHidden` covers it on a shorter way.
+With an unknown number of objects, or once objects of the usual sizes can be nowhere, the whole floor must be searched,
+for small objects too. The order hardly matters then, and `NearestHidden` covers it on a shorter way.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import numpy.typing as npt
 
 from glotouch_bt.compiled import compiled
 from glotouch_bt.perception.search.map import Exclusion, Mask, SearchMap
-from glotouch_bt.perception.search.policies.frontier import NearestFrontier
 from glotouch_bt.perception.search.policies.hidden import NearestHidden
 from glotouch_bt.perception.search.policies.policy import Stretch
 from glotouch_bt.perception.search.remaining import Discs, Remaining
@@ -51,7 +50,7 @@ class ExpectationParams:
         leg_m: Maximum length of a lattice leg.
         discount_m: Travel after which a find is worth 1/e.
         depth, width: Number of legs ahead, and beam width.
-        left: Remaining weight below which the frontier search takes over.
+        left: Remaining weight below which the whole floor is searched for small objects, too.
     """
 
     node_m: float = 0.034
@@ -212,15 +211,13 @@ class ExpectedFind:
 
     def __init__(self, params: ExpectationParams | None = None) -> None:
         self.params = params or ExpectationParams()
-        self._rest = NearestFrontier(passes=((1.0, 0.0), (0.6, 0.0)))
         self._everywhere = NearestHidden()
 
     def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
         """See `SearchPolicy`."""
         tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
-        if belief.expected is None:
-            return self._everywhere.next_stretch(belief, tip)
-        for hidden in (belief.hidden, belief.anywhere):
+        usual = () if belief.expected is None else (belief.hidden, belief.anywhere)
+        for hidden in usual:
             if hidden.weight.sum() <= self.params.left:
                 continue
             legs = self._first_legs(belief, tip, hidden)
@@ -228,7 +225,7 @@ class ExpectedFind:
                 way = legs[:1] if segment_is_free(belief, tip, legs[0]) else Routes(belief, tip).to(legs[0])
                 if way is not None:
                     return Stretch(way, further_K_m=legs[1:])
-        return self._rest.next_stretch(belief, tip)
+        return self._everywhere.next_stretch(belief, tip)
 
     def _first_legs(self, belief: SearchMap, tip: Array, hidden: Remaining) -> Array:
         """Return the ends (k, 2) of the best path's first `EXECUTED_LEGS` legs; none if no path finds anything."""

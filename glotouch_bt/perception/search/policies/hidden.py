@@ -1,6 +1,7 @@
 """Search policy that covers the floor: to the nearest place where much of what may be hidden would be touched.
 
-It goes on until no place is left where a disc of the map's prior would be touched, gaps between sweeps included.
+It goes on until no place is left where an object of any size from 15 mm on would be touched, gaps between sweeps
+included.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import scipy
 from glotouch_bt.perception.search.map import SearchMap
 from glotouch_bt.perception.search.policies.frontier import TURN_M, first_reachable, turning
 from glotouch_bt.perception.search.policies.policy import Stretch
-from glotouch_bt.perception.search.remaining import DiscPrior, discs
+from glotouch_bt.perception.search.remaining import ANY, DiscPrior, discs
 from glotouch_bt.perception.search.routes import CHECK_STEP_M, Routes, cells, grid_count
 from glotouch_bt.robot import Array
 
@@ -48,8 +49,8 @@ class NearestHidden:
 
 def gains(belief: SearchMap) -> tuple[Array, Array]:
     """Return the places (n, 2) of the grid, and the remaining weight (n,) that the ball touches there."""
-    places, touches = _touches(belief.half, belief.prior)
-    gain = touches @ belief.hidden.weight
+    places, touches = _touches(belief.half, ANY)
+    gain = touches @ belief.any_size.weight
     return places, np.where(belief.inside_exclusion(places), 0.0, gain)
 
 
