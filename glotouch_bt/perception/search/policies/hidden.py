@@ -39,7 +39,7 @@ class NearestHidden:
         """See `SearchPolicy`."""
         tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
         places, gain = gains(belief)
-        use = gain > MIN_GAIN
+        use = (gain > MIN_GAIN) & ~belief.is_dropped(places)
         goals = places[use]
         routes = Routes(belief, tip)
         way_m = routes.lengths(goals) + TURN_M * turning(belief, tip, goals)

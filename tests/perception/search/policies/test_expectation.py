@@ -146,9 +146,13 @@ def test_it_goes_where_nobody_has_been() -> None:
 
 
 def test_when_all_is_known_it_ends() -> None:
-    belief = blank().with_path(serpentine(HALF[1]))
-    assert float(weights(belief)[2].sum()) < PARAMS.left
-    assert POLICY.next_stretch(belief, belief.path_K_m[-1]) is None
+    """Rows that are farther apart leave gaps in which something small may stand."""
+    wide, narrow = (blank().with_path(serpentine(HALF[1], 2.0 * HALF[1] / rows)) for rows in (10, 20))
+    for belief in (wide, narrow):
+        assert float(weights(belief)[2].sum()) < PARAMS.left
+    assert wide.any_size.share > 0.01
+    assert POLICY.next_stretch(wide, wide.path_K_m[-1]) is not None
+    assert POLICY.next_stretch(narrow, narrow.path_K_m[-1]) is None
 
 
 def test_the_same_question_has_the_same_answer() -> None:
