@@ -55,13 +55,18 @@ def gains(belief: SearchMap) -> tuple[Array, Array]:
 
 
 def _onward(belief: SearchMap, tip_K_m: Array, way: Array, gain: Array) -> Array:
-    """Return the way (k, 2) with its end prolonged straight ahead while that is worthwhile."""
+    """Return the way (k, 2) with its end prolonged straight ahead while that is worthwhile.
+
+    It is not prolonged to a place that was given up: the sweep there was refused.
+    """
     end, before = way[-1], way[-2] if len(way) > 1 else tip_K_m
     ahead = end + (end - before) / np.linalg.norm(end - before) * np.arange(0.0, FAR_M, CHECK_STEP_M)[:, None]
     ahead = ahead[np.cumprod(belief.inside_extent(ahead) & ~belief.inside_exclusion(ahead)).astype(bool)]
     worth = gain[cells(belief.half, ahead)]
     fine = np.cumprod(worth >= ONWARD * worth[0]).astype(bool) if len(worth) else np.zeros(0, dtype=bool)
-    return np.vstack([way[:-1], ahead[fine][-1] if fine.any() else end])
+    if not fine.any() or belief.is_dropped(ahead[fine][-1])[0]:
+        return way
+    return np.vstack([way[:-1], ahead[fine][-1]])
 
 
 @lru_cache(maxsize=4)
