@@ -15,7 +15,7 @@ import scipy
 from glotouch_bt.perception.search.map import SearchMap
 from glotouch_bt.perception.search.policies.frontier import TURN_M, first_reachable, turning
 from glotouch_bt.perception.search.policies.policy import Stretch
-from glotouch_bt.perception.search.remaining import ANY, DiscPrior, discs
+from glotouch_bt.perception.search.remaining import ANY, discs
 from glotouch_bt.perception.search.routes import CHECK_STEP_M, Routes, cells, grid_count
 from glotouch_bt.robot import Array
 
@@ -49,7 +49,7 @@ class NearestHidden:
 
 def gains(belief: SearchMap) -> tuple[Array, Array]:
     """Return the places (n, 2) of the grid, and the remaining weight (n,) that the ball touches there."""
-    places, touches = _touches(belief.half, ANY)
+    places, touches = _touches(belief.half)
     gain = touches @ belief.any_size.weight
     return places, np.where(belief.inside_exclusion(places), 0.0, gain)
 
@@ -70,9 +70,9 @@ def _onward(belief: SearchMap, tip_K_m: Array, way: Array, gain: Array) -> Array
 
 
 @lru_cache(maxsize=4)
-def _touches(half: tuple[float, float], prior: DiscPrior) -> tuple[Array, Any]:
+def _touches(half: tuple[float, float]) -> tuple[Array, Any]:
     """Return the places (n, 2) and a sparse matrix (n, h), 1 where the ball at a place touches a disc."""
-    every = discs(half, prior)
+    every = discs(half, ANY)
     axes = [np.linspace(-h, h, grid_count(h)) for h in half]
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     near = scipy.spatial.cKDTree(places).query_ball_point(every.centre, every.reach)
