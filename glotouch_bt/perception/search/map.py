@@ -190,12 +190,12 @@ class SearchMap:
         point = np.asarray(point_K_m, dtype=np.float64).ravel()[None, :2]
         return replace(self, dropped=_frozen(np.concatenate([self.dropped, point])))
 
-    def is_dropped(self, points_K_m: Array) -> Mask:
-        """Return (n,) True for points (n, 2) that are dropped positions, within `DROPPED_M`."""
+    def is_dropped(self, points_K_m: Array, within_m: float = DROPPED_M) -> Mask:
+        """Return (n,) True for points (n, 2) within a distance of a dropped position."""
         points = np.asarray(points_K_m, dtype=np.float64).reshape(-1, 2)
         if len(self.dropped) == 0:
             return np.zeros(len(points), dtype=np.bool_)
-        return np.asarray(np.linalg.norm(points[:, None] - self.dropped[None], axis=2).min(axis=1) < DROPPED_M)
+        return np.asarray(np.linalg.norm(points[:, None] - self.dropped[None], axis=2).min(axis=1) < within_m)
 
     def with_obstacle(self, point_K_m: npt.ArrayLike, radius_m: float) -> SearchMap:
         """Add a disc that the tip's centre must not enter; it does not count as an object."""

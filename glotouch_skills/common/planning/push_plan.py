@@ -113,8 +113,8 @@ def touched_edge_m(
     """Return the coordinate along a push of the edge that the fingers touch, and the push's lever about the centre.
 
     The fingers are centred on the object. The lever is the distance, across the push, from the object's centre to what
-    they touch; zero if it lies within. Two fingers apart hold an object that they touch almost at the same time: the
-    lever is zero, too. It is infinite if a finger touches nothing.
+    they touch; zero if the centre lies within. With a gap, it is zero if both fingers touch the object at almost the
+    same time, and infinite if one of them misses it.
 
     Args:
         candidate: The object.
@@ -176,8 +176,9 @@ def after_push(
 ) -> Candidate:
     """Return the pushed object, from where it was met and where the fingers stopped.
 
-    It moved from the one place to the other. One that was met early or late stood elsewhere than traced, or its foot
-    reaches elsewhere than its traced section. Both are weighed by their variances (a Kalman update of one coordinate).
+    Its displacement is the distance between these two places. If it was met early or late, its traced centre was off,
+    or the low fingers met a foot that is not part of the traced section. The centre is corrected by the share that the
+    variances of both give to the first explanation (a Kalman update of one coordinate).
 
     Args:
         candidate: The object before.

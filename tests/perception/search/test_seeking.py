@@ -73,7 +73,7 @@ def test_a_refused_sweep_drops_its_own_goal() -> None:
         return free(move, tip)
 
     start = np.array([-0.01, 0.0])
-    sought, moves = run(seek(blank(0.3 * HALF), ExpectedFind(), start, lowered=True), start, answer)
+    sought, moves = run(seek(blank(0.6 * HALF), ExpectedFind(), start, lowered=True), start, answer)
     refused = [m.goal_K_m for m in moves if m.kind == "sweep" and m.goal_K_m[0] > 0.0]
     assert refused
     assert len(np.unique(refused, axis=0)) == len(refused)

@@ -10,7 +10,8 @@ from glotouch_bt.perception.search.routes import Routes
 from glotouch_bt.robot import Array, ParamError
 
 DROP_RADIUS_M = 0.012
-"""Distance from a dropped position within which a frontier is dropped too."""
+"""Distance from a dropped position within which other goals are dropped, too: where one sweep was refused, the next one
+probably is. Source: ours."""
 MIN_TRAVEL_M = 0.003
 """Minimum distance of a frontier from the tip."""
 

@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from glotouch_bt.perception.search.map import SearchMap
-from glotouch_bt.perception.search.policies.frontier import TURN_M, first_reachable, turning
+from glotouch_bt.perception.search.policies.frontier import DROP_RADIUS_M, TURN_M, first_reachable, turning
 from glotouch_bt.perception.search.policies.policy import Stretch
 from glotouch_bt.perception.search.remaining import ANY, discs
 from glotouch_bt.perception.search.routes import CHECK_STEP_M, Routes, cells, grid_count
@@ -39,7 +39,7 @@ class NearestHidden:
         """See `SearchPolicy`."""
         tip = np.asarray(tip_K_m, dtype=np.float64)[:2]
         places, gain = gains(belief)
-        use = (gain > MIN_GAIN) & ~belief.is_dropped(places)
+        use = (gain > MIN_GAIN) & ~belief.is_dropped(places, DROP_RADIUS_M)
         goals = places[use]
         routes = Routes(belief, tip)
         way_m = routes.lengths(goals) + TURN_M * turning(belief, tip, goals)
