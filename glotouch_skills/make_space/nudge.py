@@ -226,7 +226,10 @@ class Nudge(Skill):
             if best is not None and best.space_m >= NEEDED_M:
                 break
         if best is None:
-            raise self.NO_PUSH(f"no push makes space for the fingers over candidate {target.index}")
+            raise self.NO_PUSH(
+                f"no push makes space for the fingers over candidate {target.index}, or they have it already",
+                advice="state a distance to push it all the same, or take a neighbour out by hand",
+            )
         return target, best
 
     def _push(self, moving: Candidate, push: Push) -> Motion[Felt]:
