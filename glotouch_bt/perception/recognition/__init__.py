@@ -22,14 +22,23 @@ if TYPE_CHECKING:
         next_probe_touch,
         wanted,
     )
-    from glotouch_bt.perception.recognition.touched import FeltClosure, TouchedObject, encounter_of, touched_model
+    from glotouch_bt.perception.recognition.touched import (
+        Encounter,
+        FeltClosure,
+        TouchedObject,
+        beyond_jaws_m,
+        encounter_of,
+        touched_model,
+    )
 
 __getattr__ = lazy_door(
     __name__,
     **dict.fromkeys(("Belief", "infer_belief", "expected_gain", "gain_of_one"), "likelihood"),
     **dict.fromkeys(("MATCHERS", "Matcher"), "matchers"),
     **dict.fromkeys(("PadSpec", "TargetModel"), "model"),
-    **dict.fromkeys(("FeltClosure", "TouchedObject", "encounter_of", "touched_model"), "touched"),
+    **dict.fromkeys(
+        ("Encounter", "FeltClosure", "TouchedObject", "beyond_jaws_m", "encounter_of", "touched_model"), "touched"
+    ),
     **dict.fromkeys(
         ("CHANGE_S", "ProbeOption", "enough", "excluded", "hardly_felt", "next_probe_touch", "wanted"), "schedule"
     ),

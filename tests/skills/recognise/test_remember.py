@@ -10,7 +10,9 @@ import trimesh
 from py_trees.common import Status
 from pydantic import ValidationError
 
+from glotouch_bt.mission_testing import stand_in
 from glotouch_bt.perception import read_touched, touched_path
+from glotouch_bt.perception.touch import Contact
 from glotouch_bt.robot import BadInput
 from glotouch_bt.robot.scene.meshes import load_mesh
 from glotouch_skills.common.planning import find_target
@@ -91,6 +93,18 @@ def test_too_little_is_not_stored(run, solids) -> None:
     for given in (few, untopped):
         _, skill = run(given)
         assert skill.reason.code == "too_little_felt"
+
+
+def test_remember__not_as_traced__an_object_that_moved_while_it_was_traced(run, solids) -> None:
+    """The outline is 25 mm wider than the block, across which the jaws closed."""
+    touchset = touched(solids["block"], 1)
+    long_m, short_m = touchset.candidate.contour.size_m
+    wider = replace(touchset.candidate.contour, size_m=(long_m, short_m + 0.025))
+    contact = stand_in(Contact, tip_K_m=np.array([0.0, 0.0, 0.018]))
+    candidate = replace(touchset.candidate, contour=wider, contacts=(contact,))
+    _, skill = run(replace(touchset, candidate=candidate))
+    assert skill.reason.code == "not_as_traced"
+    assert not touched_path("thing").exists()
 
 
 def test_the_report_says_what_is_known(run, solids) -> None:

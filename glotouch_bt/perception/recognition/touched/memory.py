@@ -13,7 +13,7 @@ import numpy as np
 
 from glotouch_bt.perception.recognition.evidence import read_evidence
 from glotouch_bt.perception.recognition.model import PadSpec, hand_axes
-from glotouch_bt.perception.recognition.touched.outlines import middle_m
+from glotouch_bt.perception.recognition.touched.outlines import extents_m, middle_m
 from glotouch_bt.perception.touch import Contour, TouchSet, layer_patches
 from glotouch_bt.robot import Array, ParamError
 
@@ -131,6 +131,27 @@ def encounter_of(touchset: TouchSet, pad: PadSpec, pose_K_O: Planar | None = Non
         if not e.upper_only and math.isfinite(middle):
             origin = origin + across_axis * float(across_axis @ (place - origin) - middle)
     return Encounter(contour, candidate.height_m, tuple(closures))
+
+
+def beyond_jaws_m(encounter: Encounter, sensing_m: float, pad: PadSpec) -> float:
+    """Return how far the outline reaches beyond the closed jaws, at most, m; 0 if nowhere, or if no closure tells.
+
+    Pads that cover the height of the outline cannot come closer than its extent between them. If they did, the object
+    moved while it was traced, or was traced wrongly.
+
+    Args:
+        encounter: What was felt.
+        sensing_m: Height of the outline above the floor.
+        pad: The pad.
+    """
+    half_width_m, half_length_m = 0.5 * pad.window_m[0], 0.5 * pad.window_m[1]
+    found = 0.0
+    for c in encounter.closures:
+        if c.two_sided and abs(c.height_m - sensing_m) <= half_length_m:
+            low, high = extents_m(encounter.contour, np.array([c.phi_rad]), np.array([c.along_m]), half_width_m)
+            if math.isfinite(extent := float(high[0, 0] - low[0, 0])):
+                found = max(found, extent - c.width_m)
+    return found
 
 
 def in_frame(contour: Contour, pose_K_O: Planar) -> Contour:

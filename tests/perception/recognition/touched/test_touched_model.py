@@ -11,6 +11,7 @@ from glotouch_bt.perception.recognition import (
     PadSpec,
     TargetModel,
     TouchedObject,
+    beyond_jaws_m,
     encounter_of,
     touched_model,
 )
@@ -51,6 +52,16 @@ def meshes(solids):
 def test_the_widths_through_the_middle_of_a_can_are_its_diameter(can) -> None:
     middle = can.width_m[:, len(can.l_m) // 2][:, (can.z_m > 0.02) & (can.z_m < 0.06)]
     np.testing.assert_allclose(middle, 0.050, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("wider_m", "sensing_m", "beyond_m"), [(0.0, 0.018, 0.0), (0.01, 0.018, 0.01), (0.01, 0.15, 0.0)]
+)
+def test_an_outline_cannot_reach_beyond_jaws_that_closed_at_its_height(solids, wider_m, sensing_m, beyond_m) -> None:
+    encounter = encounter_of(touches(solids.cylinder(0.025, 0.070)), PAD)
+    diameter_m = encounter.contour.size_m[0] + wider_m
+    wider = replace(encounter, contour=replace(encounter.contour, size_m=(diameter_m, diameter_m)))
+    assert beyond_jaws_m(wider, sensing_m, PAD) == pytest.approx(beyond_m, abs=1e-3)
 
 
 def test_outline_and_height_of_a_can_are_its_own(can) -> None:
