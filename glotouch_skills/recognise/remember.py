@@ -39,6 +39,7 @@ class RememberParams(SkillParams):
 class Remember(Skill):
     """Store outline, height, widths and images of the object that was squeezed, in touched/NAME.json.
 
+    Nothing is stored if the jaws closed farther than the outline allows: the object moved while it was traced.
     If something was stored under this name, the touches must be of the same object. They are turned and moved into its
     frame and added, so that the object is known better after every encounter.
 
@@ -60,7 +61,6 @@ class Remember(Skill):
         "another object is stored under this name",
         advice="choose another name, or delete the file to forget the object",
     )
-
     NOT_AS_TRACED = Failure(
         "not_as_traced",
         "the jaws closed farther than the outline allows: the object moved while it was traced; nothing is stored",
