@@ -107,8 +107,8 @@ class Remember(Skill):
         beyond_m = beyond_jaws_m(encounter, float(np.mean(heights_m)), pad) if heights_m else 0.0
         if beyond_m > self.params.beyond_m:
             raise self.NOT_AS_TRACED(
-                f"the outline reaches {beyond_m * 1e3:.0f} mm beyond the closed jaws; at most "
-                f"{self.params.beyond_m * 1e3:.0f} mm are expected",
+                f"the object moved while it was traced: its outline reaches {beyond_m * 1e3:.0f} mm beyond the closed "
+                f"jaws, {self.params.beyond_m * 1e3:.0f} mm at most are expected",
                 beyond_m=beyond_m,
                 limit_m=self.params.beyond_m,
             )
