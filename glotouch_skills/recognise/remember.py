@@ -64,7 +64,7 @@ class Remember(Skill):
     )
     NOT_AS_TRACED = Failure(
         "not_as_traced",
-        "the jaws closed farther than the outline allows: the object probably moved during its trace; nothing is stored",
+        "the jaws closed farther than the outline allows: the object probably moved when traced; nothing is stored",
         advice="remember it again",
     )
 
