@@ -61,7 +61,7 @@ class Conditions:
         following_error_s: Lag of the arm behind its setpoints.
         floor_tilt_sd_deg: Tilt of the container about x_K and about y_K.
         latency_jitter_s: Largest deviation of the latencies of wrench and tactile frames.
-        contact_softness_s: Time constant of contacts of objects, probe and container.
+        contact_softness_s: Time constant of contacts of probe and container; that of objects is twice as long.
         housing_softness_s: Time constant of contacts of arm, housing and fingers.
     """
 

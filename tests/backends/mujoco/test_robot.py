@@ -115,10 +115,12 @@ def test_frames_come_at_their_rate_and_late(open_robot: Open, drive: Drive) -> N
     dead = np.isnan(np.stack([left, right]))
     assert 0.02 < dead.mean() < 0.08
     assert (dead == np.isnan(np.stack([frames[0][1].left_m, frames[0][1].right_m]))).all()
-    # the block's flat face: even indentation whose Winkler pressure carries the 10 N
-    for depth in (left, right):
-        x = np.nanmedian(depth) * 1e3
-        assert 0.2 * x / (1 - (x / 1.6) ** 2) * 17.2 * 28.5 == pytest.approx(10.0, rel=0.05)
+    # The block's flat faces are evenly indented, and the Winkler pressure carries the 10 N. The floor's friction holds
+    # the block a little against one jaw.
+    deep = np.array([np.nanmedian(left), np.nanmedian(right)]) * 1e3
+    forces = 0.2 * deep / (1 - (deep / 1.6) ** 2) * 17.2 * 28.5
+    assert forces == pytest.approx(10.0, rel=0.08)
+    assert forces.mean() == pytest.approx(10.0, rel=0.03)
     assert driver.wait(0.1).tactile is None  # nobody asks any more
 
 
