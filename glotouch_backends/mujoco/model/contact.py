@@ -25,7 +25,7 @@ GROUP_VISUAL, GROUP_COLLISION = 2, 3
 # Contacts: (time constant s, damping ratio). MuJoCo scales the stiffness with the masses in contact. 4 ms suits light
 # bodies, but an object wedged between jaws and floor then gains and loses contacts from step to step, and pushes the
 # hand with up to 34 N for one step. Steps of 1/8 ms halve such peaks, so they come from the integration. Objects are
-# therefore twice as soft, and the same peaks stay below 18 N (`bench retrieve --trials 10 --per-seed 1 --seed 59031`).
+# therefore twice as soft, and the same peaks stay below 12 N (`bench retrieve --trials 10 --per-seed 1 --seed 59031`).
 # The hand (15 kg with the motors' inertia) would hit the floor with 120 N at 20 mm/s and 4 ms. The housing is softer
 # still: 50 ms against fixed bodies, 13 ms against free ones (solmix weighs the average), about 2 N/mm a contact point,
 # like slender fingers. The pads have their own constant. Source: ours.
