@@ -174,6 +174,8 @@ def test_contacts_have_the_drawn_time_constants(open_robot: Open) -> None:
     times = {model.geom(name).id: model.geom_solref[model.geom(name).id, 0] for name in ("floor", "pad_left", "ball")}
     assert list(times.values()) == [0.003, 0.005, 0.003]
     assert set(model.geom_solref[model.geom_bodyid == robot.handles.hand_bodies.start, 0]) == {0.020}
+    bodies = robot.handles.object_bodies
+    assert set(model.geom_solref[np.isin(model.geom_bodyid, bodies) & (model.geom_contype > 0), 0]) == {0.006}
 
 
 def test_mass_and_centre_of_mass(open_robot: Open) -> None:
