@@ -23,15 +23,16 @@ AFFINITY = {
 GROUP_VISUAL, GROUP_COLLISION = 2, 3
 
 # Contacts: (time constant s, damping ratio). MuJoCo scales the stiffness with the masses in contact. 4 ms suits light
-# bodies, but an object wedged between jaws and floor then gains and loses contacts from step to step, and pushes the
-# hand with up to 34 N for one step. Steps of 1/8 ms halve such peaks, so they come from the integration. Objects are
-# therefore twice as soft, and the same peaks stay below 12 N (`bench retrieve --trials 10 --per-seed 1 --seed 59031`).
-# The hand (15 kg with the motors' inertia) would hit the floor with 120 N at 20 mm/s and 4 ms. The housing is softer
-# still: 50 ms against fixed bodies, 13 ms against free ones (solmix weighs the average), about 2 N/mm a contact point,
-# like slender fingers. The pads have their own constant. Source: ours.
+# bodies. An object of 4 ms that is wedged between jaws and floor, however, loses and regains contacts from step to step:
+# steps of 1 ms are too coarse for it, and it pushes the hand with up to 34 N. With 8 ms the same missions stay below
+# 12 N (`bench retrieve --trials 10 --per-seed 1 --seed 59031`, ea3b5568 and b89fe783). The hand (15 kg with the motors'
+# inertia) would hit the floor with 120 N at 20 mm/s and 4 ms. The housing is softer still: 50 ms against fixed bodies,
+# 13 ms against free ones (solmix weighs the average), about 2 N/mm a contact point, like slender fingers. The pads have
+# their own constant. Source: ours.
 STIFF = (0.004, 1.0)
-LOOSE = (0.008, 1.0)  # free objects
+FREE_BODY = (0.008, 1.0)
 HOUSING = (0.050, 1.0)
+SOLREF = {HAND: HOUSING, GEL: HOUSING, OBJECT: FREE_BODY}
 MIX = {ENVIRONMENT: 1.0, OBJECT: 1000.0, HAND: 150.0, GEL: 150.0, PROBE: 1000.0, HANDLE: 1000.0}
 OBJECT_IMPEDANCE = 0.5
 """Impedance of the contacts of free objects (MuJoCo's solimp, 0..1; 1: rigid). With MuJoCo's default of 0.9, an object
@@ -61,19 +62,19 @@ def set_category(geom: mujoco.MjsGeom, category: int) -> None:
     geom.conaffinity = AFFINITY[category]
     geom.condim = 4
     geom.group = GROUP_COLLISION
-    geom.solref = HOUSING if category in (HAND, GEL) else LOOSE if category == OBJECT else STIFF
+    geom.solref = SOLREF.get(category, STIFF)
     geom.solmix = MIX[category]
     if category == OBJECT:
         geom.solimp[:2] = OBJECT_IMPEDANCE
 
 
 def set_softness(spec: mujoco.MjSpec, contact_s: float, housing_s: float) -> None:
-    """Replace the time constants of `STIFF` and `HOUSING` in every geom, and scale `LOOSE` with the former.
+    """Replace the time constants of `STIFF` and `HOUSING` in every geom, and scale `FREE_BODY` with the former.
 
     The gel pads keep theirs.
     """
-    loose_s = LOOSE[0] / STIFF[0] * contact_s
-    new = {STIFF: (contact_s, STIFF[1]), LOOSE: (loose_s, LOOSE[1]), HOUSING: (housing_s, HOUSING[1])}
+    free_s = FREE_BODY[0] / STIFF[0] * contact_s
+    new = {STIFF: (contact_s, STIFF[1]), FREE_BODY: (free_s, FREE_BODY[1]), HOUSING: (housing_s, HOUSING[1])}
     for geom in spec.geoms:
         geom.solref = new.get(tuple(geom.solref), geom.solref)
 
