@@ -23,8 +23,8 @@ AFFINITY = {
 GROUP_VISUAL, GROUP_COLLISION = 2, 3
 
 # Contacts: (time constant s, damping ratio). MuJoCo scales the stiffness with the masses in contact. 4 ms suits light
-# bodies. An object of 4 ms that is wedged between jaws and floor, however, loses and regains contacts from step to step:
-# steps of 1 ms are too coarse for it, and it pushes the hand with up to 34 N. With 8 ms the same missions stay below
+# bodies. But an object of 4 ms that is wedged between jaws and floor loses and regains contacts from step to step.
+# Steps of 1 ms are too coarse for it: it pushes the hand with up to 34 N. With 8 ms the same missions stay below
 # 12 N (`bench retrieve --trials 10 --per-seed 1 --seed 59031`, ea3b5568 and b89fe783). The hand (15 kg with the motors'
 # inertia) would hit the floor with 120 N at 20 mm/s and 4 ms. The housing is softer still: 50 ms against fixed bodies,
 # 13 ms against free ones (solmix weighs the average), about 2 N/mm a contact point, like slender fingers. The pads have
