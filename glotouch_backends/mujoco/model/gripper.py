@@ -14,6 +14,7 @@ from glotouch_backends.mujoco.model.contact import (
     HAND,
     HAND_FRICTION,
     PAD,
+    PAD_IMPEDANCE,
     set_category,
     set_friction,
 )
@@ -90,7 +91,7 @@ def add_gripper(spec: mujoco.MjSpec, hand: mujoco.MjsBody, gripper: Gripper, pad
         )
         _box(finger, back, FINGER_COLOUR)
         gel = _box(finger, pad, PAD_COLOUR, f"pad_{name}", GEL)
-        gel.solref = PAD
+        gel.solref, gel.solimp[:3] = PAD, PAD_IMPEDANCE
         set_friction(gel, pad_friction, priority=2, torsion_m=GEL_TORSION_M)
         motor = spec.add_actuator(name=f"jaw_{name}", target=f"jaw_{name}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
         motor.set_to_position(kp=JAW_STIFFNESS_N_M, kv=JAW_DAMPING_NS_M)

@@ -172,7 +172,7 @@ def test_contacts_have_the_drawn_time_constants(open_robot: Open) -> None:
     robot = open_robot(Conditions(contact_softness_s=(0.003, 0.003), housing_softness_s=(0.020, 0.020)))
     model = robot.model
     times = {model.geom(name).id: model.geom_solref[model.geom(name).id, 0] for name in ("floor", "pad_left", "ball")}
-    assert list(times.values()) == [0.003, 0.005, 0.003]
+    assert list(times.values()) == [0.003, 0.007, 0.003]
     assert set(model.geom_solref[model.geom_bodyid == robot.handles.hand_bodies.start, 0]) == {0.020}
     bodies = robot.handles.object_bodies
     assert set(model.geom_solref[np.isin(model.geom_bodyid, bodies) & (model.geom_contype > 0), 0]) == {0.006}

@@ -115,11 +115,11 @@ def test_frames_come_at_their_rate_and_late(open_robot: Open, drive: Drive) -> N
     dead = np.isnan(np.stack([left, right]))
     assert 0.02 < dead.mean() < 0.08
     assert (dead == np.isnan(np.stack([frames[0][1].left_m, frames[0][1].right_m]))).all()
-    # The block's flat faces are evenly indented, and the Winkler pressure carries the 10 N. The floor's friction holds
-    # the block a little against one jaw.
+    # The block's flat faces are evenly indented, and the Winkler pressure carries the 10 N. The floor's friction (the
+    # block weighs 3.1 N, friction 0.66) holds the block against one jaw: the soft pads leave it off centre.
     deep = np.array([np.nanmedian(left), np.nanmedian(right)]) * 1e3
     forces = 0.2 * deep / (1 - (deep / 1.6) ** 2) * 17.2 * 28.5
-    assert forces == pytest.approx(10.0, rel=0.08)
+    assert forces == pytest.approx(10.0, rel=0.15)
     assert forces.mean() == pytest.approx(10.0, rel=0.03)
     assert driver.wait(0.1).tactile is None  # nobody asks any more
 
