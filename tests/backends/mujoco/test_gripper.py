@@ -13,6 +13,7 @@ from glotouch_backends.mujoco import MujocoBackend
 from glotouch_backends.mujoco.control.jaws import JawReports
 from glotouch_backends.mujoco.model.gripper import PAD_PROUD_M
 from glotouch_backends.mujoco.robot import MujocoRobot
+from glotouch_backends.mujoco.sensing.gel import BOTTOM_M
 from glotouch_backends.mujoco.sensing.tactile import PadContacts
 from glotouch_bt.robot import Command, Conditions, GripperState, GripperTarget, ParamError, SetPayload
 from tests.backends.mujoco.conftest import BLOCK_M
@@ -33,7 +34,7 @@ def over_block(open_robot: Open, drive: Drive) -> Any:
 
 @pytest.mark.parametrize("force_N", [5.0, 10.0, 30.0])
 def test_force_limit(over_block: Any, force_N: float) -> None:
-    """Each pad presses on a block with the commanded force, in balance, and without overshoot."""
+    """Each pad presses with the commanded force, in balance, without overshoot; the block sinks into the gel only."""
     robot, pads = over_block.robot, PadContacts(over_block.robot.model, over_block.robot.data, over_block.robot.handles)
     over_block.cycle(Command(gripper=GripperTarget(0.0, 0.04, force_N)))
     peak = 0.0
@@ -45,6 +46,9 @@ def test_force_limit(over_block: Any, force_N: float) -> None:
     assert left == pytest.approx(force_N, rel=0.02)
     assert right == pytest.approx(force_N, rel=0.02)
     assert peak < 1.3 * force_N + 1.0
+    contacts = robot.data.contact
+    on_pads = np.isin(contacts.geom, robot.handles.pad_geoms).any(axis=1)
+    assert 1e-4 < -contacts.dist[on_pads].min() < BOTTOM_M
     assert over_block.last.gripper.force_N == pytest.approx(force_N, rel=1e-3)
     assert not over_block.last.gripper.moving
     assert np.abs(over_block.last.wrench_S[-1, :2]).max() < 0.2  # a squeeze is no force on the wrist
