@@ -279,9 +279,9 @@ def _occupied(candidate: Candidate) -> Contour:
 
 
 def _next_index(belief: SearchMap, candidates: Iterable[Candidate]) -> int:
-    """Return an index that no candidate has, and no traced object whose candidate was left out."""
-    traced = (e.index for e in belief.exclusions if e.index is not None)
-    return max(chain((c.index for c in candidates), traced), default=belief.first_index - 1) + 1
+    """Return an index that no candidate has or had."""
+    traced = (e.index + 1 for e in belief.exclusions if e.index is not None)
+    return max(chain((c.index + 1 for c in candidates), traced, (belief.first_index,)))
 
 
 def _admitted(

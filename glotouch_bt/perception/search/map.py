@@ -97,7 +97,7 @@ class SearchMap:
         unprobed: As many objects are traced as are known, but in doubt, and candidates that may be two bodies are still
             to be probed.
         probed: Indices of the candidates that were probed for that; each is probed once.
-        first_index: Index of the first candidate; smaller ones were given to candidates that were forgotten.
+        first_index: Least index of a new candidate; smaller ones may have been given to candidates that were forgotten.
     """
 
     half_extent_m: Array
@@ -184,6 +184,13 @@ class SearchMap:
     def without_exclusion(self, index: int) -> SearchMap:
         """Remove a traced object: it is a part of another one."""
         return replace(self, exclusions=tuple(e for e in self.exclusions if e.index != index))
+
+    def only_with(self, candidates: Iterable[Candidate]) -> SearchMap:
+        """Remove traced objects that are no candidates: they turned out to be parts of others, or are gone."""
+        kept = {c.index for c in candidates}
+        gone = [e.index for e in self.exclusions if e.index is not None and e.index not in kept]
+        left = tuple(e for e in self.exclusions if e.index is None or e.index in kept)
+        return replace(self, exclusions=left, first_index=max([self.first_index, *(i + 1 for i in gone)]))
 
     def with_dropped(self, point_K_m: npt.ArrayLike) -> SearchMap:
         """Add a position (2,) that the search must not try again."""

@@ -37,6 +37,25 @@ def test_one_more_object_is_looked_for_where_nothing_was_searched(bench, found) 
     assert len(skill.map.path_K_m) == len(before.path_K_m)
 
 
+def test_what_turned_out_to_be_another_object_does_not_count(bench, found) -> None:
+    """Three objects were traced, but two of them are one: the search was complete too early."""
+    apart = [found.round((x, 0.0), 0.02, index=i) for i, x in enumerate((-0.08, 0.0, 0.08))]
+    before = SearchMap.blank((0.13, 0.18), 3)
+    for candidate in apart:
+        before = before.with_exclusion(envelope(candidate), 0.01, candidate.index)
+    b = bench()
+    skill = b.make(SearchAnew, inputs={"before": before, "candidates": tuple(apart[:2])}, more_objects=1)
+    b.run(skill)
+    after = skill.map
+    assert before.complete
+    assert not after.complete
+    assert (after.expected, after.found, skill.found) == (3, 2, 2)
+    place = apart[2].contour.centre_K_m[None]
+    assert before.inside_exclusion(place).all()
+    assert not after.inside_exclusion(place).any()
+    assert after.first_index == 3
+
+
 def test_search_anew__nothing_searched(bench) -> None:
     b = bench()
     skill = b.make(SearchAnew)
