@@ -40,10 +40,10 @@ that rocks between the jaws and meets the floor is stopped within a step, and th
 such peaks: 32.7 and 37.0 N in `bench retrieve --conditions realistic`, train of seeds 36013 and 36026, 3643226."""
 PAD = (0.007, 1.0)
 PAD_IMPEDANCE = (0.3, 0.95, 0.0016)
-"""Impedance of a gel pad at its surface and from the indentation (third value, m) at which the gel is rigid. So a pad
-is soft at first and stiffens. Source: ours; with PAD, a curved object sinks about as deep as the law of `sensing.gel`
-says, whose shift is then small. A stiff pad whose edge slips onto a ledge of the object throws the hand up: 46.8 N
-(`bench retrieve --trials 10 --per-seed 1 --seed 59041`, train of 59048, b89fe783)."""
+"""Impedance of a gel pad (MuJoCo's solimp): at its surface, at the indentation where the gel is rigid, and that
+indentation, m (`sensing.gel.BOTTOM_M`). Source: ours; with PAD, a curved object sinks about as deep as the gel's law
+says. A stiffer pad whose edge slips onto a ledge of the object throws the hand up: 46.8 N (`bench retrieve --trials 10
+--per-seed 1 --seed 59041`, train of 59048, b89fe783)."""
 PAD_HANDLE = (0.0035, 1.0)  # two contacts are as stiff as four of (0.005, 1.0)
 PAD_HANDLE_FRICTION = (0.002, 1.0)  # pads on the probe's handle: stiffer, or the probe drifts during transfers
 
