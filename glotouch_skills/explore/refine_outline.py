@@ -36,7 +36,7 @@ class RefineOutlineParams(TracingParams):
 
 
 class RefineOutline(Skill):
-    """Refine a coarsely traced candidate until it can be squeezed and grasped, or trace it anew.
+    """Refine a coarsely traced candidate until it can be squeezed and grasped.
 
     SUCCESS: `refined` is the candidate with its new contacts. An outline that is known well already stays unchanged.
     """
@@ -58,14 +58,12 @@ class RefineOutline(Skill):
 
     tool = In(HeldTool, "the held probe")
     candidate = In(Candidate, "the object as traced so far")
-    anew = In(tuple, "indices of candidates whose contacts and top are given up", required=False, expected=False)
     known = In(tuple, "all candidates", key="candidates", element=Candidate, required=False, expected=False)
     refined = Out(Candidate, "the object as traced now", key="candidate", always=True)
 
     def run(self) -> SkillRun:
         """See the class."""
         p, tool, before = self.params, self.tool, self.candidate
-        anew = before.index in (self.anew or ())
         self.refined = before
         others = tuple(c for c in self.known or () if c.index != before.index)
         radius = tool.tip_radius_m if tool.round else 0.0
@@ -79,7 +77,6 @@ class RefineOutline(Skill):
             round_tip=tool.round,
             half_extent_m=half,
             columns=explorer.columns,
-            anew=anew,
             elsewhere=partial(of_another, others, radius),
         )
         traced = yield from explorer.run(plan)
@@ -93,7 +90,7 @@ class RefineOutline(Skill):
                 f"candidate {before.index} was lost among others: what was traced is another one",
                 advice="it stands too near to them to be traced from the side",
             )
-        self.refined = replace(better, height_m=p.height_m, top_touched=False) if anew else better
+        self.refined = better
         moved = float(np.linalg.norm(traced.displaced_K_m))
         explorer.distrust_free_space(better.contour, moved)
         self.event("candidate", candidate=self.refined, moved_m=moved, ended=traced.ended, moves=traced.moves)

@@ -73,11 +73,13 @@ class MatchTarget(Skill):
     postponed = In(
         int, "number of candidates that may be the target and are not measured yet", required=False, expected=False
     )
+    recognised = Out(bool, "one is surely the target", always=True)
     ranking = Out(Ranking, "all candidates, best first", result=in_words)
     plan = Out(GraspPlan, "how to grasp the best one")
 
     def run(self) -> SkillRun:
         """See the class."""
+        self.recognised = False
         rejected = self.rejected or ()
         touchsets = tuple(t for t in self.touchsets or () if t.candidate.index not in rejected)
         if not touchsets:
@@ -104,6 +106,7 @@ class MatchTarget(Skill):
             raise self.NOT_RECOGNISED(
                 f"no candidate is surely {target.name}: {why}", advice=_advice(ranking), margin=ranking.margin
             )
+        self.recognised = True
         best = next(t for t in touchsets if t.candidate.index == ranking.best.index)
         quat = ranking.best.quat
         self.plan = plan_grasp(best, ranking.best, target.standing(quat), model.standing(quat), gripper)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -107,6 +108,8 @@ class TouchNext(Skill):
         "nothing, or the jaws do not span the outline, and none felt them",
         element=int,
     )
+    in_doubt = Out(int, "number of these")
+    absent = Out(float, "probability that none of the candidates is the target")
     cramped = Out(
         tuple, "indices of candidates on which closures lack only space, most probable first", element=int, always=True
     )
@@ -142,7 +145,7 @@ class TouchNext(Skill):
             raise self.NO_CANDIDATES("there is no candidate to touch", candidates=len(candidates))
         touchsets: tuple[TouchSet, ...] = self.felt or ()
         self.refused = refused = self.refused_before or ()
-        self.doubtful = self.doubtful_before or ()
+        self._doubt(self.doubtful_before or ())
         before = [_state(t.candidate) for t in touchsets]
         if before != [_state(c) for c in wanted]:  # found, rejected, or measured anew
             made = {t.candidate.index: t.sequences for t in touchsets}
@@ -158,9 +161,10 @@ class TouchNext(Skill):
         self.touchsets, self.decided = touchsets, False
         yield HOLD  # the computation takes longer than a control period; on hardware the arm holds meanwhile
         belief = recognition.infer_belief(self._target_model(), touchsets)
+        self.absent = float(belief.ranking.p_absent)
         vain = (t for t in touchsets if not any(layer.stable for layer in t.layers))
         self._hopeless = frozenset(t.candidate.index for t in vain if len(t.layers) >= MAX_VAIN_CLOSURES)
-        self.doubtful = tuple(sorted({*self.doubtful, *self._hopeless}))
+        self._doubt((*self.doubtful, *self._hopeless))
         why = recognition.enough(belief, self.params.confidence, self._hopeless)
         chosen = None if why else self._choose(belief, down)
         self._tell_unfit()
@@ -170,7 +174,7 @@ class TouchNext(Skill):
             self.lacks_space = bool(self.cramped)
             if chosen is None:  # the target fits between the jaws; an outline that does not is wrong
                 too_wide = recognition.hardly_felt(belief) - {o.closure.candidate for o in found}
-                self.doubtful = tuple(sorted({*self.doubtful, *too_wide}))
+                self._doubt((*self.doubtful, *too_wide))
         if chosen is not None and chosen.closure.candidate in self._unmeasured(belief):
             why = f"candidate {chosen.closure.candidate} would tell most, once the probe has measured it"
         if why or chosen is None:
@@ -180,7 +184,7 @@ class TouchNext(Skill):
             down, layer = yield from self._touch(candidates, chosen, down)
         except MotionRefused as refusal:
             self._refuse(chosen, tried=True)
-            self.doubtful = tuple(sorted({*self.doubtful, chosen.closure.candidate}))
+            self._doubt((*self.doubtful, chosen.closure.candidate))
             self.event("note", text=f"a closure on candidate {chosen.closure.candidate} was not made: {refusal}")
             return
         self._down = down
@@ -196,6 +200,11 @@ class TouchNext(Skill):
             probability={m.index: m.probability for m in belief.ranking.matches},
             p_absent=belief.ranking.p_absent,
         )
+
+    def _doubt(self, indices: Iterable[int]) -> None:
+        """Set the candidates that may be elsewhere or have another outline."""
+        self.doubtful = tuple(sorted(set(indices)))
+        self.in_doubt = len(self.doubtful)
 
     def _target_model(self) -> TargetModel:
         """Return the target's model, kept in memory.
@@ -324,7 +333,7 @@ class TouchNext(Skill):
         if (moved := disturbance(hand.candidate, layer, object_motion)) is not None:
             self.event("object_moved", **moved)
         elif layer.stable:  # it is where it was traced
-            self.doubtful = tuple(i for i in self.doubtful if i != index)
+            self._doubt(i for i in self.doubtful if i != index)
         return hand, layer
 
     def _rise(self, down: Squeezing | None) -> Motion[None]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from glotouch_bt.mission_testing import fails, ok
-from tests.mission.retrieve_scripts import Run, each_code, found, measures, retrieve, safely, skills
+from tests.mission.retrieve_scripts import Run, candidates, each_code, found, measures, retrieve, safely, skills
 
 __all__ = ["retrieve"]
 
-DECIDED = ok(decided=True, lacks_space=False)
-REFUSED = fails("not_recognised")
+DECIDED = ok(decided=True, lacks_space=False, in_doubt=0, absent=0.1)
+REFUSED = fails("not_recognised", recognised=False)
 KEPT = {"start_over": fails("consistent")}
 
 
@@ -24,7 +24,7 @@ def test_it_goes_through_its_stages_in_order(retrieve: Run) -> None:
         "tool_check", "wrist_check", "guarded_sweep", "orbit_probe",
         "next_probe", "refine_outline", "next_probe", "touch_top", "next_probe", "tool_check 3", "tool_return",
         "wrist_check 3", "touch_next", "touch_next",
-        "match", "put_back", "wrist_check 13", "grasp", "lift", "hold_check", "object_check",
+        "match", "put_back", "wrist_check 9", "grasp", "lift", "hold_check", "object_check",
     ]  # fmt: skip
 
 
@@ -55,12 +55,13 @@ def test_what_is_excluded_is_neither_refined_nor_topped(retrieve: Run) -> None:
 
 def test_if_the_evidence_does_not_suffice_what_was_put_off_is_measured(retrieve: Run) -> None:
     script = {"match": REFUSED, "match 2": REFUSED, "match 3": ok(), "touch_next*": DECIDED, "orbit_probe": found(3)}
-    late = "*/measure what was put off/*"
+    late = "*/measure what was put off, or was moved/*"
     script |= {"next_probe*": measures(1, postponed=1), late + "next_probe*": measures(1, 2)}
     run = retrieve(script, mission="retrieve")
     assert run.succeeded
     assert skills(run, late) == [
-        "tool_pickup", "tool_calibrate", "next_probe", "refine_outline", "next_probe", "touch_top", "next_probe",
+        "tool_pickup", "tool_calibrate", "forget_doubtful",
+        "next_probe", "refine_outline", "next_probe", "touch_top", "next_probe",
         "tool_check", "tool_return", "wrist_check", "touch_next", "match",
     ]  # fmt: skip
     (touched,) = run.calls_of(late + "touch_next*")
@@ -69,10 +70,16 @@ def test_if_the_evidence_does_not_suffice_what_was_put_off_is_measured(retrieve:
 
 
 def test_if_that_does_not_suffice_what_was_excluded_is_measured(retrieve: Run) -> None:
-    script = {"match": REFUSED, "match 2": REFUSED, "match 4": ok(), "touch_next*": DECIDED, "orbit_probe": found(3)}
+    script = {
+        "match": [REFUSED, ok()],
+        "match 2": REFUSED,
+        "match 4": ok(),
+        "touch_next*": DECIDED,
+        "orbit_probe": found(3),
+    }
     run = scheduled(retrieve, script, 1)
     assert run.succeeded
-    assert not run.calls_of("*/measure what was put off/*tool_pickup*")
+    assert not run.calls_of("*/measure what was put off, or was moved/*tool_pickup*")
     last = "*/measure what was excluded/*"
     assert skills(run, last).count("refine_outline") == skills(run, last).count("touch_top") == 2
     (touched,) = run.calls_of(last + "touch_next*")
@@ -84,21 +91,53 @@ def test_if_all_was_measured_the_probe_is_taken_again_only_to_search_on(retrieve
     run = scheduled(retrieve, {"match*": REFUSED, "touch_next*": DECIDED})
     assert safely(run, "not_recognised")
     assert (run.ran("match"), run.ran("match 2"), len(run.calls_of("tool_pickup*"))) == (1, 1, 2)
-    assert run.before("tool_pickup 5", "search_anew 2")
+    assert run.before("*/search on/*/tool_pickup*", "*/search on/*/search_anew*")
 
 
-def test_what_is_doubtful_is_measured_anew_though_the_search_finds_nothing_more(retrieve: Run) -> None:
-    script = {"match": REFUSED, "match 2": REFUSED, "match 5": ok(), "touch_next*": DECIDED}
-    script |= {"measure_anew": ok(given_up=1, anew=(0,), probed=()), "search_anew 2": ok(found=1)}
-    run = scheduled(retrieve, script | {"guarded_sweep 2": fails("search_exhausted", exhausted=True)})
+MOVED = "*/measure what was put off, or was moved/*"
+DOUBTED = {
+    "match": REFUSED,
+    "match 2": REFUSED,
+    "match 3": ok(),
+    "touch_next*": ok(decided=True, lacks_space=False, in_doubt=1),
+}
+
+
+def test_what_is_not_where_it_was_traced_is_searched_again_at_once(retrieve: Run) -> None:
+    script = {
+        "forget_doubtful*": ok(forgotten=1, candidates=candidates(0.9), probed=()),
+        MOVED + "orbit_probe*": found(2),
+    }
+    run = scheduled(retrieve, DOUBTED | script, 1)
     assert run.succeeded
-    last = skills(run, "*/search_on/*")
-    assert [last.count(s) for s in ("guarded_sweep", "refine_outline", "touch_top")] == [1, 1, 1]
+    assert skills(run, MOVED) == [
+        "tool_pickup", "tool_calibrate", "forget_doubtful",
+        "tool_check", "wrist_check", "guarded_sweep", "orbit_probe",
+        "next_probe", "refine_outline", "next_probe", "touch_top", "next_probe",
+        "tool_check", "tool_return", "wrist_check", "touch_next", "match",
+    ]  # fmt: skip
+    assert run.calls_of(MOVED + "refine_outline*")[0].inputs["candidate"].index == 1, "only what may be the target"
+    assert not run.calls_of("*/look_further/*")
+
+
+def test_if_it_is_found_nowhere_the_rest_is_touched(retrieve: Run) -> None:
+    gone = {"forget_doubtful*": ok(forgotten=1, candidates=candidates(0.9), probed=())}
+    gone |= {MOVED + "guarded_sweep*": fails("search_exhausted", exhausted=True)}
+    run = scheduled(retrieve, DOUBTED | gone | {"orbit_probe": found(2)}, 1)
+    assert run.succeeded
+    assert not run.calls_of(MOVED + "orbit_probe*")
+    assert run.ran(MOVED + "touch_next*") == 1
 
 
 @each_code("tool_pickup")
 def test_without_the_probe_the_rest_is_touched_as_it_is(retrieve: Run, code: str) -> None:
-    script = {"match": REFUSED, "match 2": REFUSED, "match 4": ok(), "touch_next*": DECIDED, "orbit_probe": found(2)}
+    script = {
+        "match": [REFUSED, ok()],
+        "match 2": REFUSED,
+        "match 4": ok(),
+        "touch_next*": DECIDED,
+        "orbit_probe": found(2),
+    }
     last = "*/measure what was excluded/*"
     run = scheduled(retrieve, script | {last + "tool_pickup*": fails(code)}, 1)
     assert run.succeeded
@@ -142,8 +181,10 @@ def test_it_begins_again_only_once(retrieve: Run) -> None:
 
 # --- space for the fingers -------------------------------------------------------------------------------------------
 
-CRAMPED = ok(decided=True, cramped=(0,), lacks_space=True)
+CRAMPED = ok(decided=True, cramped=(0,), lacks_space=True, in_doubt=0, absent=0.1)
 MAKE_SPACE = "*/make_space/*"
+SAFELY = ("none is the target so far", "make_space 2", "begin again", "end safely")
+"""Where an object in the hand ends the mission, in order."""
 NOT_KNOWN = {f"match{n}": REFUSED for n in (" 2", " 3", " 4", " 5")} | {
     "match": [REFUSED, ok()],
     "touch_next*": CRAMPED,
@@ -155,8 +196,15 @@ def test_where_closures_lack_space_a_push_makes_it_and_the_target_is_recognised_
     assert run.succeeded
     assert skills(run, MAKE_SPACE) == ["stow", "wrist_check", "nudge"]
     assert run.calls_of("nudge")[0].inputs["cramped_before"] == (0,)
-    assert run.before("search_anew 2", "nudge"), "what moves nothing comes first"
+    assert not run.calls_of("*/look_further/*"), "that takes minutes"
     assert run.ran("match") == 2
+
+
+def test_if_the_target_is_probably_not_among_them_what_moves_nothing_comes_first(retrieve: Run) -> None:
+    doubted = ok(decided=True, cramped=(0,), lacks_space=True, in_doubt=0, absent=0.9)
+    run = scheduled(retrieve, NOT_KNOWN | {"touch_next*": doubted})
+    assert run.succeeded
+    assert run.before("*/look_further/*search_anew*", "nudge*")
 
 
 @each_code("nudge")
@@ -176,17 +224,18 @@ def test_where_nothing_lacks_space_nothing_is_moved(retrieve: Run) -> None:
 
 
 def test_if_no_space_can_be_made_the_first_reason_is_kept(retrieve: Run) -> None:
-    script = {"match*": REFUSED, "touch_next*": CRAMPED, "nudge": fails("no_push"), "clear_plan": fails("no_clear")}
+    script = {"match*": REFUSED, "touch_next*": CRAMPED}
+    script |= {"nudge*": fails("no_push"), "clear_plan*": fails("no_clear")}
     assert safely(scheduled(retrieve, script), "not_recognised")
 
 
 def test_an_object_that_can_be_set_down_nowhere_ends_the_mission_in_the_hand(retrieve: Run) -> None:
     held = {"nudge": fails("no_push"), "set_down 2": fails("no_place"), "put_back 7": fails("in_the_way")}
-    held |= {"*/begin again/stow*": fails("object_held"), "*/end safely/stow*": fails("object_held")}
+    held |= {f"*/{where}/*stow*": fails("object_held") for where in SAFELY}
     run = scheduled(retrieve, {"match*": REFUSED, "touch_next*": CRAMPED} | held)
     assert run.status == "failure"
     assert (run.ran("nudge"), run.ran("set_down 2")) == (1, 1)
-    assert [c.skill for c in run.calls[run.order.index("set_down 2") + 1 :]] == ["put_back", "stow", "stow"]
+    assert [c.skill for c in run.calls[run.order.index("set_down 2") + 1 :]] == ["put_back", *["stow"] * len(SAFELY)]
 
 
 def test_where_the_hand_fits_at_no_grasp_space_is_made_and_the_target_is_recognised_again(retrieve: Run) -> None:

@@ -192,6 +192,13 @@ class SearchMap:
         left = tuple(e for e in self.exclusions if e.index is None or e.index in kept)
         return replace(self, exclusions=left, first_index=max([self.first_index, *(i + 1 for i in gone)]))
 
+    def unsearched(self, outline: Contour, within_m: float) -> SearchMap:
+        """Forget the path and the dropped positions within a distance of an outline: something may stand there now."""
+        near_path, near_dropped = (
+            signed_distance(outline, points) < within_m for points in (self.path_K_m, self.dropped)
+        )
+        return replace(self, path_K_m=_frozen(self.path_K_m[~near_path]), dropped=_frozen(self.dropped[~near_dropped]))
+
     def with_dropped(self, point_K_m: npt.ArrayLike) -> SearchMap:
         """Add a position (2,) that the search must not try again."""
         point = np.asarray(point_K_m, dtype=np.float64).ravel()[None, :2]

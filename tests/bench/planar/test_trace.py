@@ -170,22 +170,6 @@ def test_what_moved_unfelt_is_traced_anew(world_of: WorldOf) -> None:
     assert missed <= 4
 
 
-@pytest.mark.parametrize("shift", [(0.0, 0.0), (0.018, 0.0), (-0.01, 0.02)])
-def test_a_moved_object_is_traced_anew(world_of: WorldOf, shift: tuple[float, float]) -> None:
-    """It was pushed and turned after its trace: of the old contacts nothing is left in the new outline."""
-    world = world_of([box(0.06, 0.04)], [(*CENTRE, 0.3)])
-    before = traced(world, touched_from(world, 0.7))
-    world.poses[0, :2] += shift
-    world.poses[0, 2] += 0.8
-    rule = RefineOutlineParams().rule()
-    plan = trace_more(before.contacts, world.tip_K_m, TIP, rule, half_extent_m=INNER, anew=True)
-    result = drive(plan, world.execute)
-    assert result.contour is not None
-    assert not result.missing
-    assert float(np.linalg.norm(result.contour.centre_K_m - centres_of(world)[0])) < 1.5e-3
-    assert result.contour.size_m == pytest.approx((0.06, 0.04), abs=2e-3)
-
-
 def three_limbs() -> Mesh:
     """Three bars from one middle, 34 mm long, 12 mm wide."""
     bars = []

@@ -74,7 +74,6 @@ def trace_more(
     round_tip: bool = True,
     half_extent_m: Array | None = None,
     columns: Callable[[], Array] | None = None,
-    anew: bool = False,
     elsewhere: Elsewhere | None = None,
 ) -> SearchPlan[OutlineTrace]:
     """Continue the trace of an object from above: hop to where the outline is least certain.
@@ -83,7 +82,6 @@ def trace_more(
         known: Its contacts, at its current position.
         tip_K_m, tip_radius_m, params, round_tip, half_extent_m, elsewhere: As for `trace`; the ball may be raised.
         columns: Returns the places (n, 2) where the ball can come down through felt, free space.
-        anew: The object moved since, or is another one: start again from what is met first.
     """
     p = params or TraceParams()
     s = TraceState.begin(_still(known), tip_K_m, tip_radius_m, round_tip, half_extent_m)
@@ -99,9 +97,6 @@ def trace_more(
             outcome = yield Move("probe", outline.centre_K_m + INSIDE_M * unit(s.tip - outline.centre_K_m))
             s.record(outcome)
             met = outcome.contact
-        if met is not None and anew:
-            plan = trace(met, s.tip, s.radius, p, round_tip=s.round, half_extent_m=s.half, elsewhere=elsewhere)
-            return (yield from plan)
         if met is not None and not (elsewhere and elsewhere(s.present(), met)) and s.belongs(outline, met, p):
             s.add(met, outline, p)
             yield from _retreat(s, p)
