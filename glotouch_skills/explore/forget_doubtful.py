@@ -55,7 +55,15 @@ class ForgetDoubtful(Skill):
         self.doubtful, self.forgotten = (), len(gone)
         self.probed = tuple(t for t in self.before_probed or () if t.candidate not in doubtful)
         self.touchsets = tuple(t for t in self.felt or () if t.candidate.index not in doubtful)
-        self.event("forget_doubtful", candidates=tuple(c.index for c in gone))
+        if gone:
+            indices = tuple(c.index for c in gone)
+            self.event("forgotten", why="not where it was traced", candidates=indices)
+            self.report(
+                "Searched again",
+                "Closures contradicted these outlines. They were forgotten, and their places were searched again.",
+                ("forgotten candidates",),
+                ((", ".join(map(str, indices)),),),
+            )
         belief = self.before.only_with(self.candidates)
         for candidate in gone:
             belief = belief.unsearched(candidate.contour, candidate.height_m + AROUND_M)

@@ -64,7 +64,7 @@ class StartOver(Skill):
         self.times_forgotten = times + 1
         self.context.arm.felt.forget()
         indices = tuple(c.index for c in candidates)
-        self.event("start_over", why=why, candidates=indices)
+        self.event("forgotten", why=why, candidates=indices)
         self.report(
             "Begun again",
             "What was found contradicted itself. It was forgotten, and the search began again.",

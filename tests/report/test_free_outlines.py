@@ -1,15 +1,18 @@
-"""A free outline is drawn as its corners, in the map and in the 3D view; a faulty one is left out."""
+"""What the map and the 3D view draw: a free outline as its corners; nothing faulty, and nothing that was forgotten."""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from glotouch_bt.mission.record.mcap_scene import event_scene
-from glotouch_bt.report.sections.map import contour_of
+from glotouch_bt.mission.record.recorder import Recorder
+from glotouch_bt.report import read_run
+from glotouch_bt.report.sections.map import candidates, contour_of
 
 CORNERS = [[0.02, 0.0], [0.0, 0.03], [-0.02, 0.0]]
 
@@ -52,3 +55,16 @@ def test_what_is_no_outline_is_left_out(corners: Any) -> None:
     c = candidate(family="free", boundary_K_m=corners)
     assert contour_of(c) is None
     assert drawn(c) == []
+
+
+def test_a_forgotten_candidate_is_drawn_no_more(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "run.mcap", {"mission": "m"}) as record:
+        for index in range(3):
+            record.event("candidate", 1.0 + index, {"candidate": candidate() | {"index": index}})
+        record.event("forgotten", 5.0, {"candidates": [0, 2]})
+        record.event("candidate", 6.0, {"candidate": candidate() | {"index": 2}})
+    assert [c["index"] for c in candidates(read_run(tmp_path))] == [1, 2]
+    ((topic, scene),) = event_scene("forgotten", 0, {"candidates": [0, 2]})
+    assert topic == "/scene"
+    assert [d["id"] for d in json.loads(scene)["deletions"]] == ["candidate 0", "candidate 2"]
+    assert not list(event_scene("forgotten", 0, {"candidates": [None]}))

@@ -57,7 +57,7 @@ def registered_container(run: dict[str, Json]) -> Pose | None:
 
 
 def event_scene(kind: str, stamp_ns: int, data: Json) -> Iterator[Message]:
-    """Yield what a contact or candidate event adds to the view."""
+    """Yield what an event adds to the view (contacts, candidates) or removes from it (forgotten candidates)."""
     if not isinstance(data, dict):
         return
     try:
@@ -89,6 +89,10 @@ def event_scene(kind: str, stamp_ns: int, data: Json) -> Iterator[Message]:
                 "text": f"candidate {candidate['index']}",
             }
             yield _update(_entity(stamp_ns, f"candidate {candidate['index']}", lines=[line], texts=[text]))
+        elif kind == "forgotten":
+            forgotten: Any = data["candidates"]
+            gone = [{"timestamp": _time(stamp_ns), "type": 0, "id": f"candidate {int(i)}"} for i in forgotten]
+            yield "/scene", dumps({"deletions": gone, "entities": []})
     except (AttributeError, KeyError, TypeError, ValueError):
         return  # an event of another shape is recorded but not drawn
 

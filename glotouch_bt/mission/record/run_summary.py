@@ -144,8 +144,9 @@ class RunSummary:
             self.contacts += 1
         elif kind == "candidate":
             self._store(_candidate(to_json(data.get("candidate", data))), str(data.get("node", "")))
-        elif kind == "start_over":
-            self.candidates = []
+        elif kind == "forgotten":
+            gone = to_json(data.get("candidates", ()))
+            self.candidates = [c for c in self.candidates if not isinstance(gone, list) or _index(c) not in gone]
         elif kind == "ranking":
             self.ranking = to_json(data.get("ranking", data), summarise=True)
         elif kind == "result":
@@ -158,13 +159,18 @@ class RunSummary:
 
     def _store(self, candidate: Json, node: str) -> None:
         """Store a candidate; a candidate measured again replaces its earlier entry."""
-        index = candidate.get("index") if isinstance(candidate, dict) else None
-        known = [c.get("index") if isinstance(c, dict) else None for c in self.candidates]
+        index = _index(candidate)
+        known = [_index(c) for c in self.candidates]
         at = known.index(index) if index is not None and index in known else len(known)
         self.candidates[at : at + 1] = [candidate]
         if text := objects_in_words(self.candidates):
             others = {key: result for key, result in self.results.items() if key != OBJECTS_RESULT}
             self.results = {OBJECTS_RESULT: {"node": node, "text": text}, **others}
+
+
+def _index(candidate: Json) -> Json:
+    """Return the index of a candidate, or None if it has another shape."""
+    return candidate.get("index") if isinstance(candidate, dict) else None
 
 
 def _candidate(data: Json) -> Json:

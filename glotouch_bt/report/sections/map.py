@@ -21,9 +21,10 @@ PATH_POINTS = 4000
 def candidates(record: RunRecord) -> list[dict[str, Any]]:
     """Return the last entry of each candidate that was not forgotten, in order of index."""
     found: dict[int, dict[str, Any]] = {}
-    for e in record.of_kind("candidate", "touchset", "start_over"):
-        if e.kind == "start_over":
-            found.clear()
+    for e in record.of_kind("candidate", "touchset", "forgotten"):
+        if e.kind == "forgotten":
+            forgotten = e.data.get("candidates")
+            found = {i: c for i, c in found.items() if not isinstance(forgotten, list) or i not in forgotten}
             continue
         holder = e.data.get("touchset") if e.kind == "touchset" else e.data
         c = holder.get("candidate") if isinstance(holder, dict) else None

@@ -365,7 +365,7 @@ class RunModel:
         candidate = event.data.get("candidate")
         if event.kind == "reject" and isinstance(candidate, int):
             states[candidate] = "rejected"
-        elif event.kind == "start_over" and isinstance(forgotten := event.data.get("candidates"), list):
+        elif event.kind == "forgotten" and isinstance(forgotten := event.data.get("candidates"), list):
             states |= dict.fromkeys((i for i in forgotten if isinstance(i, int)), "rejected")
         elif event.kind in ("lift", "put_back"):
             grasp = self._grasps.last(event.stamp_s)

@@ -28,11 +28,12 @@ def test_the_result_has_each_object_as_it_was_measured_last() -> None:
 
 def test_objects_that_were_forgotten_are_no_result() -> None:
     summary = RunSummary(NullRecord())
-    summary.event("candidate", 2.0, {"node": "orbit_probe", "candidate": candidate(0, 0.03, False)})
-    summary.event("start_over", 3.0, {"node": "start_over", "candidates": (0,)})
-    summary.event("candidate", 4.0, {"node": "orbit_probe", "candidate": candidate(1, 0.03, False)})
-    assert [c["index"] for c in summary.candidates] == [1]
-    assert summary.results["candidates"]["text"].startswith("1 object traced")
+    for index in range(3):
+        summary.event("candidate", 2.0, {"node": "orbit_probe", "candidate": candidate(index, 0.03, False)})
+    summary.event("forgotten", 3.0, {"node": "forget_doubtful", "candidates": (0, 2)})
+    summary.event("candidate", 4.0, {"node": "orbit_probe", "candidate": candidate(3, 0.03, False)})
+    assert [c["index"] for c in summary.candidates] == [1, 3]
+    assert summary.results["candidates"]["text"].startswith("2 objects traced")
 
 
 @pytest.mark.parametrize("odd", [None, {}, {"index": 0}, {"contour": 3}, {"contour": {"size_m": ["a", "b"]}}])

@@ -171,6 +171,7 @@ def test_phases_and_judgements_follow_their_events(tmp_path: Path) -> None:
         (5.0, "plan", {"plan": plan}),
         (6.0, "lift", {}),
         (7.0, "put_back", {"candidate": 2}),
+        (7.5, "forgotten", {"candidates": [1]}),
         (8.0, "failure", {"node": "a/b", "code": "tool_lost", "message": "it fell"}),
     ]
     with Recorder(tmp_path / "run.mcap", {"mission": "m"}) as record:
@@ -190,6 +191,7 @@ def test_phases_and_judgements_follow_their_events(tmp_path: Path) -> None:
     assert model.state_at(6.0).states[2] == "taken"
     assert model.state_at(6.0).grasp is None
     assert model.state_at(7.0).states[2] == "best"
+    assert model.state_at(7.5).states[1] == "rejected"
     assert [model.state_at(t).probe_lost for t in (7.9, 8.0)] == [False, True]
     assert model.marks.stamps == [8.0]
     assert "b: it fell" in model.marks.values[0].text
