@@ -131,12 +131,13 @@ def planned(*plans: GraspPlan) -> type[Skill]:
 
         POSTCONDITIONS: ClassVar = {}
         plan = Out(GraspPlan, "how to grasp it")
+        recognised = Out(bool, "it has a plan", always=True)
         candidates = Out(tuple, "what is known")
         touchsets = Out(tuple, "what was felt", element=TouchSet)
 
         def run(self) -> SkillRun:
             yield HOLD
-            self.candidates, self.touchsets = (), ()
+            self.candidates, self.touchsets, self.recognised = (), (), bool(left)
             if not left:
                 raise SkillFailed("not_recognised", "no plan is left")
             self.plan = left.pop(0)
