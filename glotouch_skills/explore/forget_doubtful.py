@@ -11,7 +11,8 @@ from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun
 
 AROUND_M = 0.02
-"""Distance around an outline, beyond the object's height, within which the object may stand or lie now."""
+"""Distance around an outline, beyond the object's height, within which the object may stand or lie now. Source:
+ours."""
 
 
 class ForgetDoubtfulParams(SkillParams):
@@ -22,9 +23,10 @@ class ForgetDoubtful(Skill):
     """Forget the doubtful candidates and what was searched around them, so that the search finds them where they are.
 
     A fingertip that comes down on something, or a hand that is pressed while the jaws close, says that the object was
-    pushed, turned or toppled, or that its outline is wrong. A toppled object lies within its height of its outline.
+    pushed, turned or toppled, or that its outline is wrong. A toppled object lies at most its height from its outline.
 
-    SUCCESS: `candidates` and `map` have no doubtful candidate; the map expects as many objects as before.
+    SUCCESS: `candidates` and `map` have no doubtful candidate. A known number of objects is at least the number of the
+    candidates before, so that the search goes on until the forgotten ones are found.
     """
 
     Params = ForgetDoubtfulParams

@@ -10,6 +10,8 @@ __all__ = ["retrieve"]
 DECIDED = ok(decided=True, lacks_space=False, in_doubt=0, absent=0.1)
 REFUSED = fails("not_recognised", recognised=False)
 KEPT = {"start_over": fails("consistent")}
+EXCLUDED = {"match": [REFUSED, ok()], "match 2": REFUSED, "match 4": ok(), "touch_next*": DECIDED}
+"""The target is recognised once what was excluded is measured."""
 
 
 def scheduled(retrieve: Run, script, *measured: int, **settings):
@@ -70,13 +72,7 @@ def test_if_the_evidence_does_not_suffice_what_was_put_off_is_measured(retrieve:
 
 
 def test_if_that_does_not_suffice_what_was_excluded_is_measured(retrieve: Run) -> None:
-    script = {
-        "match": [REFUSED, ok()],
-        "match 2": REFUSED,
-        "match 4": ok(),
-        "touch_next*": DECIDED,
-        "orbit_probe": found(3),
-    }
+    script = EXCLUDED | {"orbit_probe": found(3)}
     run = scheduled(retrieve, script, 1)
     assert run.succeeded
     assert not run.calls_of("*/measure what was put off, or was moved/*tool_pickup*")
@@ -129,15 +125,21 @@ def test_if_it_is_found_nowhere_the_rest_is_touched(retrieve: Run) -> None:
     assert run.ran(MOVED + "touch_next*") == 1
 
 
+def test_after_the_last_search_the_rest_is_touched_if_what_was_forgotten_is_not_found(retrieve: Run) -> None:
+    last = "*/search on/*"
+    script = {"match": [REFUSED, ok()], "match 2": REFUSED, "match 5": ok(), "touch_next*": DECIDED}
+    script |= {last + "forget_doubtful*": ok(forgotten=1, candidates=candidates(0.9), probed=())}
+    script |= {last + "guarded_sweep*": fails("search_exhausted", exhausted=True), last + "search_anew*": ok(found=1)}
+    run = scheduled(retrieve, script)
+    assert run.succeeded
+    done = skills(run, last)
+    assert [done.count(s) for s in ("guarded_sweep", "orbit_probe", "refine_outline", "touch_top")] == [1, 0, 1, 1]
+    assert run.ran("match 5") == 1
+
+
 @each_code("tool_pickup")
 def test_without_the_probe_the_rest_is_touched_as_it_is(retrieve: Run, code: str) -> None:
-    script = {
-        "match": [REFUSED, ok()],
-        "match 2": REFUSED,
-        "match 4": ok(),
-        "touch_next*": DECIDED,
-        "orbit_probe": found(2),
-    }
+    script = EXCLUDED | {"orbit_probe": found(2)}
     last = "*/measure what was excluded/*"
     run = scheduled(retrieve, script | {last + "tool_pickup*": fails(code)}, 1)
     assert run.succeeded

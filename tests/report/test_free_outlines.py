@@ -1,4 +1,4 @@
-"""What the map and the 3D view draw: a free outline as its corners; nothing faulty, and nothing that was forgotten."""
+"""The map and the 3D view draw free outlines by their corners, but no faulty outlines and no forgotten candidates."""
 
 from __future__ import annotations
 
