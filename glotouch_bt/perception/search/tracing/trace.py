@@ -44,6 +44,7 @@ def trace(
     known: tuple[Contact, ...] = (),
     elsewhere: Elsewhere | None = None,
     joined: Callable[[tuple[Contact, ...]], bool] | None = None,
+    taken: Callable[[Array], Array] | None = None,
 ) -> SearchPlan[OutlineTrace]:
     """Trace the outline of a touched object. The ball ends beside it, at sensing height.
 
@@ -61,6 +62,7 @@ def trace(
     p = params or TraceParams()
     s = TraceState.begin([*_still(known), first], tip_K_m, tip_radius_m, round_tip, half_extent_m)
     s.given = len(known)
+    s.taken = taken
     yield from _retreat(s, p)
     return (yield from _until_known(s, p, elsewhere, joined))
 
@@ -75,6 +77,7 @@ def trace_more(
     half_extent_m: Array | None = None,
     columns: Callable[[], Array] | None = None,
     elsewhere: Elsewhere | None = None,
+    taken: Callable[[Array], Array] | None = None,
 ) -> SearchPlan[OutlineTrace]:
     """Continue the trace of an object from above: hop to where the outline is least certain.
 
@@ -86,9 +89,11 @@ def trace_more(
     p = params or TraceParams()
     s = TraceState.begin(_still(known), tip_K_m, tip_radius_m, round_tip, half_extent_m)
     s.known, s.given, s.columns = len(known), len(known), columns or s.columns
+    s.taken = taken
     outline, bearings = s.outline(), all_bearings()
     distance, sd = s.ring(outline, bearings, p)
-    walled = np.any(np.abs(places_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
+    beside = places_beside(outline, bearings, distance, sd, p)
+    walled = np.any(np.abs(beside) > s.half, axis=1) | s.is_taken(beside)
     for i in _apart(np.where(walled, -1.0, sd), p.misses):
         down, met = yield from _come_down(outline, s, p, float(bearings[i]))
         if not down:
@@ -202,7 +207,8 @@ def _enough(outline: OutlineBelief, s: TraceState, p: TraceParams) -> str:
         or (s.known and s.odd >= 0 and n < s.odd + p.settling)
     ):
         return ""
-    _, sd = s.ring(outline, all_bearings(), p)
+    distance, sd = s.ring(outline, all_bearings(), p)
+    sd = np.where(s.is_taken(places_beside(outline, all_bearings(), distance, sd, p)), 0.0, sd)
     centre_sd = np.sqrt(outline.centre_sd_m**2 + np.diag(s.shift_covariance(p)))
     if np.max(centre_sd) <= p.centre_sd_m and float(np.max(sd)) <= p.radial_sd_m:
         return "the outline is known"
@@ -222,7 +228,8 @@ def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | Non
     bearings = all_bearings()
     distance, sd = s.ring(outline, bearings, p)
     here = s.bearing(outline)
-    walled = np.any(np.abs(places_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
+    beside = places_beside(outline, bearings, distance, sd, p)
+    walled, taken = np.any(np.abs(beside) > s.half, axis=1), s.is_taken(beside)
     over_m = np.where(walled, np.inf, p.hop_m)
     best, worth = None, 0.0
     step = 2 * np.pi / BEARINGS
@@ -236,6 +243,7 @@ def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | Non
         gain = sd**p.keen / (np.where(barred, over_m, way) + p.way_m)
         if side == -s.side:
             gain *= p.back
+        gain[taken] = 0.0
         if s.blocked:
             near = np.min(np.abs(wrapped(bearings[:, None] - np.array(s.blocked)[None, :])), axis=1)
             gain[near < np.deg2rad(12.0)] = 0.0

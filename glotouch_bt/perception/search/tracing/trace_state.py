@@ -105,6 +105,7 @@ class TraceState:
         given: Number of contacts in `raw` at the start.
         known: Number of contacts in `raw` from an earlier trace.
         columns: Returns the places (n, 2) where the ball can come down through felt, free space.
+        taken: Returns which of the places (n, 2) of the ball are taken by other objects.
     """
 
     tip: Array
@@ -125,6 +126,7 @@ class TraceState:
     raised: bool = False
     shift_information: Array = field(default_factory=lambda: np.zeros((2, 2)))
     columns: Callable[[], Array] = lambda: np.zeros((0, 2))
+    taken: Callable[[Array], Array] | None = None
 
     @classmethod
     def begin(
@@ -214,6 +216,10 @@ class TraceState:
         if self.odd < 0 and self.surprising(outline, contact, p):
             self.odd = len(self.raw)
         self.raw.append(contact)
+
+    def is_taken(self, places_K_m: Array) -> Array:
+        """Return (n,) True for places (n, 2) of the ball that are taken by other objects."""
+        return np.zeros(len(places_K_m), dtype=np.bool_) if self.taken is None else self.taken(places_K_m)
 
     def bearing(self, outline: OutlineBelief) -> float:
         """Return the bearing of the ball from the outline's centre, rad."""
