@@ -151,6 +151,10 @@ class Division:
     parts: tuple[tuple[Contact, ...], ...]
     share: float
 
+    def is_likelier(self, belief: SearchMap) -> bool:
+        """Return True if it is more probably two bodies than a missing object is hidden."""
+        return max(belief.anywhere.share, UNMET) < self.share
+
 
 def division_of(belief: SearchMap, known: tuple[Candidate, ...], radius_m: float) -> Division | None:
     """Return the candidate that is most probably two bodies; None if none can be, or no object is missing.

@@ -26,6 +26,8 @@ from glotouch_bt.robot import Array
 WORTH_DIVIDING = 0.2
 """Share of the places left above which no candidate is more probably two bodies than a missing object is hidden there.
 Source: `TWO_BODIES`, with two objects missing."""
+CHECKED_CHANCE = 0.1
+"""Minimum probability that two candidates are one body for one of them to be traced further. Source: ours."""
 CHECKED_CONTACTS = 12
 """Number of contacts from which on a doubtful candidate is not traced further. Source: ours."""
 
@@ -63,7 +65,7 @@ def seek_next(
         if sought.contact is not None or belief.complete:
             return sought, known
         two = division_of(belief, known, radius)
-        if two is not None and max(belief.anywhere.share, UNMET) < two.share:
+        if two is not None and two.is_likelier(belief):
             now = divided(belief, known, two, radius)
             belief, known = now.belief, now.candidates
         elif enough > 0.0:
@@ -141,7 +143,7 @@ def _next_check(admitted: Admitted, checked: set[int]) -> tuple[Candidate, Candi
     """
     ends = _all_traced(admitted)
     best: tuple[Candidate, Candidate] | None = None
-    for pair in (doubt.pair for doubt in admitted.doubts):
+    for pair in (doubt.pair for doubt in admitted.doubts if doubt.chance >= CHECKED_CHANCE):
         indices = {c.index for c in pair}
         if indices & checked or not (ends or indices <= set(admitted.changed)):
             continue

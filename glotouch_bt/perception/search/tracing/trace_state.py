@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from glotouch_bt.perception.search.moves import MoveOutcome
-from glotouch_bt.perception.search.tracing.trace_params import TraceParams
+from glotouch_bt.perception.search.tracing.trace_params import Taken, TraceParams, none_taken
 from glotouch_bt.perception.touch import Contact, Contour, split_at_motion
 from glotouch_bt.perception.touch.outline import OutlineBelief, infer_outline, wrapped
 from glotouch_bt.robot import Array
@@ -105,7 +105,7 @@ class TraceState:
         given: Number of contacts in `raw` at the start.
         known: Number of contacts in `raw` from an earlier trace.
         columns: Returns the places (n, 2) where the ball can come down through felt, free space.
-        taken: Returns which of the places (n, 2) of the ball are taken by other objects.
+        taken: Returns (n,) True for places (n, 2) of the ball where it would overlap another object.
     """
 
     tip: Array
@@ -126,7 +126,7 @@ class TraceState:
     raised: bool = False
     shift_information: Array = field(default_factory=lambda: np.zeros((2, 2)))
     columns: Callable[[], Array] = lambda: np.zeros((0, 2))
-    taken: Callable[[Array], Array] | None = None
+    taken: Taken = none_taken
 
     @classmethod
     def begin(
@@ -216,10 +216,6 @@ class TraceState:
         if self.odd < 0 and self.surprising(outline, contact, p):
             self.odd = len(self.raw)
         self.raw.append(contact)
-
-    def is_taken(self, places_K_m: Array) -> Array:
-        """Return (n,) True for places (n, 2) of the ball that are taken by other objects."""
-        return np.zeros(len(places_K_m), dtype=np.bool_) if self.taken is None else self.taken(places_K_m)
 
     def bearing(self, outline: OutlineBelief) -> float:
         """Return the bearing of the ball from the outline's centre, rad."""
