@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.perception.search import TraceParams, lost_among, of_another, refined, trace_more
+from glotouch_bt.perception.search import TraceParams, lost_among, of_another, refined, taken_by, trace_more
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Out, Skill, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
@@ -78,6 +78,7 @@ class RefineOutline(Skill):
             half_extent_m=half,
             columns=explorer.columns,
             elsewhere=partial(of_another, others, radius),
+            taken=partial(taken_by, others, tool.tip_radius_m),
         )
         traced = yield from explorer.run(plan)
         better = refined(before, traced)

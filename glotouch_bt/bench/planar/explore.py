@@ -21,6 +21,7 @@ from glotouch_bt.perception.search import (
     of_another,
     refined,
     seek_next,
+    taken_by,
     trace_bodies,
     trace_more,
 )
@@ -168,8 +169,16 @@ def refine_all(world: PlanarWorld, explored: Explored, *, budget_m: float | None
     out, execute = list(explored.found), _limited(world, budget_m)
     for i, traced in sorted(enumerate(explored.found), key=lambda item: item[1].candidate.quality):
         others = tuple(t.candidate for j, t in enumerate(out) if j != i)
-        known, elsewhere = traced.candidate.contacts, partial(of_another, others, world.tip_radius_m)
-        more = trace_more(known, world.tip_K_m, world.tip_radius_m, tracing, half_extent_m=half, elsewhere=elsewhere)
+        radius = world.tip_radius_m
+        more = trace_more(
+            traced.candidate.contacts,
+            world.tip_K_m,
+            radius,
+            tracing,
+            half_extent_m=half,
+            elsewhere=partial(of_another, others, radius),
+            taken=partial(taken_by, others, radius),
+        )
         try:
             better = refined(traced.candidate, drive(more, execute))
         except _OutOfBudget:

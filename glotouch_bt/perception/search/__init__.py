@@ -1,6 +1,6 @@
 """Pure planners of tactile exploration: search for objects, outline tracing and height measurement."""
 
-from glotouch_bt.perception.search.belonging import joins, of_another, part_of
+from glotouch_bt.perception.search.belonging import joins, of_another, part_of, taken_by
 from glotouch_bt.perception.search.bodies import BESIDE_M, distinct, outline_of
 from glotouch_bt.perception.search.candidates import (
     HALF_QUALITY_SD_M,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from glotouch_bt.perception.search.bodies import SEPARATE_NATS, outline_of
-from glotouch_bt.perception.search.map import FACING
+from glotouch_bt.perception.search.map import FACING, Mask
 from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams
 from glotouch_bt.perception.touch import Candidate, Contact, contour_quality, signed_distance
 from glotouch_bt.perception.touch.outline import KNOWN_QUALITY, convex_hull, envelope, polygon_distance
@@ -81,6 +81,15 @@ def of_another(known: tuple[Candidate, ...], radius_m: float, contacts: tuple[Co
         and gain(c.contacts) - gain(contacts) > SEPARATE_NATS
         for c in known
     )
+
+
+def taken_by(others: tuple[Candidate, ...], radius_m: float, places_K_m: Array) -> Mask:
+    """Return (n,) True for places (n, 2) where a ball would overlap another candidate whose outline is known."""
+    taken = np.zeros(len(places_K_m), dtype=np.bool_)
+    for c in others:
+        if c.quality >= KNOWN_QUALITY:
+            taken |= signed_distance(envelope(c), places_K_m) < radius_m
+    return taken
 
 
 def _is_well_traced(candidate: Candidate) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, count
 
 import numpy as np
+import scipy
 
 from glotouch_bt.perception.search.belonging import MAX_LENGTH_M, is_fully_traced, is_over, overlaps
 from glotouch_bt.perception.search.bodies import (
@@ -45,7 +46,8 @@ MIN_CONTACTS = 3
 HALF_QUALITY_SD_M = 0.005
 """Standard deviation of the centre at quality 1/2."""
 UNMET = 0.01
-"""Probability that an object was not met although the path touched its place. Source: ours."""
+"""Probability that an object was not met although the path touched its place: the least share of places left that is
+told apart from none. Source: ours."""
 
 
 @dataclass(frozen=True)
@@ -135,11 +137,31 @@ def _with_parts(
     return _admitted(belief, every, radius_m, whole.index, tuple(changed))
 
 
-def divided(belief: SearchMap, known: tuple[Candidate, ...], radius_m: float) -> Admitted | None:
-    """Divide the candidate that is probably two bodies, because objects are missing; None if none probably is.
+@dataclass(frozen=True, eq=False)
+class Division:
+    """The candidate that is most probably two bodies, because objects are missing.
+
+    Attributes:
+        whole: The candidate.
+        parts: The contacts of each body, the body with most contacts first.
+        share: Share of the places left below which it is more probably two bodies than the missing object is hidden.
+    """
+
+    whole: Candidate
+    parts: tuple[tuple[Contact, ...], ...]
+    share: float
+
+    def is_likelier(self, belief: SearchMap) -> bool:
+        """Return True if it is more probably two bodies than a missing object is hidden."""
+        return max(belief.anywhere.share, UNMET) < self.share
+
+
+def division_of(belief: SearchMap, known: tuple[Candidate, ...], radius_m: float) -> Division | None:
+    """Return the candidate that is most probably two bodies; None if none can be, or no object is missing.
 
     With K of N objects traced, each met with probability 1 - h, the odds that K candidates are K + 1 bodies change by
-    the ratio of C(N, B) (1 - h)^B h^(N - B) for B = K + 1 and B = K: (N - K) / (K + 1) * (1 - h) / h.
+    the ratio of C(N, B) (1 - h)^B h^(N - B) for B = K + 1 and B = K: (N - K) / (K + 1) * (1 - h) / h. At the share h
+    that is returned, they are even.
 
     Args:
         belief, known: Map and candidates.
@@ -148,18 +170,27 @@ def divided(belief: SearchMap, known: tuple[Candidate, ...], radius_m: float) ->
     if belief.expected is None or belief.found >= belief.expected:
         return None
     missing = belief.expected - belief.found
-    margin_m = {e.index: e.given_margin_m for e in belief.exclusions}
-    cuts = {c.index: division(c.contacts, radius_m, belief.path_K_m) for c in known if c.index in margin_m}
+    traced = {e.index for e in belief.exclusions}
+    cuts = {c.index: division(c.contacts, radius_m, belief.path_K_m) for c in known if c.index in traced}
     if not cuts:
         return None
-    hidden = max(belief.anywhere.share, UNMET)
     whole = max((c for c in known if c.index in cuts), key=lambda c: cuts[c.index][0])
     gain, parts = cuts[whole.index]
     log_odds = TWO_BODIES["intercept"] + TWO_BODIES["per_nat"] * min(gain, SEPARATE_NATS)
-    if log_odds + np.log(missing / (belief.found + 1) * (1.0 - hidden) / hidden) <= 0.0:
-        return None
-    parts = tuple(sorted(parts, key=len, reverse=True))
-    return _with_parts(belief, known, whole, parts, radius_m, margin_m[whole.index])
+    even = float(scipy.special.expit(log_odds + np.log(missing / (belief.found + 1))))
+    return Division(whole, tuple(sorted(parts, key=len, reverse=True)), even)
+
+
+def divided(belief: SearchMap, known: tuple[Candidate, ...], division: Division, radius_m: float) -> Admitted:
+    """Return map and candidates with the two bodies of a candidate.
+
+    Args:
+        belief, known: Map and candidates.
+        division: The candidate and its parts.
+        radius_m: Radius of the ball.
+    """
+    margin_m = {e.index: e.given_margin_m for e in belief.exclusions}
+    return _with_parts(belief, known, division.whole, division.parts, radius_m, margin_m[division.whole.index])
 
 
 def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclusion_m: float) -> Admitted:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from functools import partial
 
-from glotouch_bt.perception.search.belonging import joins, of_another, part_of
+from glotouch_bt.perception.search.belonging import joins, of_another, part_of, taken_by
 from glotouch_bt.perception.search.candidates import (
     UNMET,
     Admitted,
     admit,
     all_separated,
     divided,
+    division_of,
     regroup,
 )
 from glotouch_bt.perception.search.map import SearchMap
@@ -22,6 +23,11 @@ from glotouch_bt.perception.search.tracing import Elsewhere, OutlineTrace, Trace
 from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.robot import Array
 
+WORTH_DIVIDING = 0.2
+"""Share of the places left above which no candidate is more probably two bodies than a missing object is hidden there.
+Source: `TWO_BODIES`, with two objects missing."""
+CHECKED_CHANCE = 0.1
+"""Minimum probability that two candidates are one body for one of them to be traced further. Source: ours."""
 CHECKED_CONTACTS = 12
 """Number of contacts from which on a doubtful candidate is not traced further. Source: ours."""
 
@@ -45,7 +51,7 @@ def seek_next(
         policy, tip_K_m, lowered: As for `seek`.
         tip_radius_m, round_tip: As for `trace`.
     """
-    radius, enough = tip_radius_m if round_tip else 0.0, UNMET
+    radius, enough = tip_radius_m if round_tip else 0.0, WORTH_DIVIDING
     while True:
         while (suspect := next_suspect(belief, known, radius)) is not None:
             belief = belief.with_probed(suspect.index)
@@ -58,11 +64,12 @@ def seek_next(
         belief, tip_K_m, lowered = sought.belief, sought.tip_K_m, sought.lowered
         if sought.contact is not None or belief.complete:
             return sought, known
-        two = divided(belief, known, radius)
-        if two is not None:
-            belief, known = two.belief, two.candidates
+        two = division_of(belief, known, radius)
+        if two is not None and two.is_likelier(belief):
+            now = divided(belief, known, two, radius)
+            belief, known = now.belief, now.candidates
         elif enough > 0.0:
-            enough = 0.0
+            enough = two.share if two is not None and UNMET < two.share < enough else 0.0
         else:
             return sought, known
 
@@ -106,6 +113,7 @@ def trace_bodies(
         half_extent_m=belief.half_extent_m,
         known=() if old is None else old.contacts,
         elsewhere=elsewhere(tuple(c for c in known if c is not old)),
+        taken=partial(taken_by, tuple(c for c in known if c is not old), tip_radius_m),
         joined=partial(joins, known, radius_m=radius) if old is None else None,
     )
     admitted = admit(belief, known, first, traced, height_m, exclusion_m, part_of=old)
@@ -122,6 +130,7 @@ def trace_bodies(
             round_tip=round_tip,
             half_extent_m=belief.half_extent_m,
             elsewhere=elsewhere(rest),
+            taken=partial(taken_by, rest, tip_radius_m),
         )
         admitted = regroup(admitted, whole.index, part.index, more, exclusion_m)
     return all_separated(admitted, radius, exclusion_m), traced
@@ -134,7 +143,7 @@ def _next_check(admitted: Admitted, checked: set[int]) -> tuple[Candidate, Candi
     """
     ends = _all_traced(admitted)
     best: tuple[Candidate, Candidate] | None = None
-    for pair in (doubt.pair for doubt in admitted.doubts):
+    for pair in (doubt.pair for doubt in admitted.doubts if doubt.chance >= CHECKED_CHANCE):
         indices = {c.index for c in pair}
         if indices & checked or not (ends or indices <= set(admitted.changed)):
             continue

@@ -11,7 +11,16 @@ import trimesh
 
 from glotouch_bt.bench.planar import ContactModel, PlanarWorld
 from glotouch_bt.motion import drive
-from glotouch_bt.perception.search import Move, MoveOutcome, OutlineTrace, TraceParams, of_another, trace, trace_more
+from glotouch_bt.perception.search import (
+    Move,
+    MoveOutcome,
+    OutlineTrace,
+    TraceParams,
+    of_another,
+    taken_by,
+    trace,
+    trace_more,
+)
 from glotouch_bt.perception.search.bodies import outline_of
 from glotouch_bt.perception.search.candidates import quality
 from glotouch_bt.perception.search.tracing.trace_state import TraceState
@@ -242,6 +251,38 @@ def test_refining_beside_a_neighbour_keeps_to_its_object(world_of: WorldOf) -> N
     assert (np.abs(world.clearance(tips, 0)) < np.abs(world.clearance(tips, 1))).all()
     assert result.contour is not None
     assert float(np.linalg.norm(result.contour.centre_K_m - centres_of(world)[0])) < 3e-3
+
+
+def test_nothing_is_probed_where_a_known_neighbour_stands(world_of: WorldOf) -> None:
+    """A disc touches a box in the middle of its side: there, the ball would only touch the disc again."""
+    disc = CENTRE + np.array([0.0, 0.025 + 0.030])
+    contacts = tuple(
+        Contact(0.0, np.array([*(disc + (0.03 + TIP) * out), 0.018]), np.array([*-out, 0.0]), np.array([*out, 0.0]),
+                disc + 0.03 * out, 1.0)
+        for a in (0.0, 0.8, 1.6, 2.4, np.pi) if (out := np.array([np.cos(a), np.sin(a)])) is not None
+    )  # fmt: skip
+    outline = outline_of(contacts, TIP)
+    neighbour = Candidate(1, outline.contour, 0.018, quality(outline), contacts)
+    places = disc + np.array([[0.0, 0.0], [0.0, 0.030 + 0.5 * TIP], [0.0, 0.030 + 1.5 * TIP]])
+    np.testing.assert_array_equal(taken_by((neighbour,), TIP, places), [True, True, False])
+    unknown = replace(neighbour, quality=0.2)
+    assert not taken_by((unknown,), TIP, places).any(), "it may be a part of the same object"
+    touches = []
+    for others in ((), (neighbour,)):
+        world = world_of([box(0.1, 0.05), cylinder(0.03)], [(*CENTRE, 0), (*disc, 0)])
+        plan = trace(
+            touched_from(world, -1.5),
+            world.tip_K_m,
+            TIP,
+            OrbitProbeParams().rule(),
+            half_extent_m=INNER,
+            elsewhere=partial(of_another, (neighbour,), TIP),
+            taken=partial(taken_by, others, TIP),
+        )
+        result = drive(plan, world.execute)
+        tips = np.array([c.tip_K_m[:2] for c in (*result.contacts, *result.outliers)])
+        touches.append(int((np.abs(world.clearance(tips, 1)) < 1e-3).sum()))
+    assert touches[1] < touches[0]
 
 
 def test_what_is_too_long_for_one_object_is_two(world_of: WorldOf) -> None:

@@ -19,7 +19,7 @@ from glotouch_bt.perception.search.bodies import (
     doubts,
     outline_of,
 )
-from glotouch_bt.perception.search.candidates import divided, regroup
+from glotouch_bt.perception.search.candidates import divided, division_of, regroup
 from glotouch_bt.perception.touch import Candidate, Contact
 from tests.support.ball_contacts import NO_PATH, R, box, candidate, contact, disc
 
@@ -75,23 +75,21 @@ def test_parts_of_one_body_are_doubtful_and_bodies_far_apart_are_not() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gain", "contacts", "qualities", "chance"),
+    ("gain", "length_m", "contacts", "log_odds"),
     [
-        (0.0, (LEFT[:3], LEFT[3:]), (0.5, 0.5), 1.0 / (1.0 + np.exp(1.7 - 1.5))),  # centres inside each other
-        (40.0, (LEFT[:3], LEFT[3:]), (0.5, 0.5), 1.0 / (1.0 + np.exp(1.7 + 0.8 - 1.5))),
-        (40.0, (LEFT, RIGHT), (0.5, 0.5), 1.0 / (1.0 + np.exp(1.7 + 0.8))),
-        (40.0, (LEFT, RIGHT), (0.5, 0.2), 1.0 / (1.0 + np.exp(1.7 + 0.8 - 2.1))),
-        (np.inf, (LEFT, RIGHT), (0.5, 0.2), 1.0 / (1.0 + np.exp(1.7 + 2.4 - 2.1))),
-        (61.0, (LEFT, RIGHT), (0.5, 0.5), None),  # two bodies beyond doubt
+        (0.0, 0.060, (LEFT, LEFT[:3]), 5.2 - 0.0285 * 60.0),  # the contacts of one lie on the outline of the other
+        (40.0, 0.060, (LEFT, LEFT[:3]), 5.2 - 0.021 * 40.0 - 0.0285 * 60.0),
+        (500.0, 0.100, (LEFT, LEFT[:3]), 5.2 - 0.021 * 120.0 - 0.0285 * 100.0),
+        (120.0, 0.200, (LEFT, RIGHT), None),  # two bodies almost for certain
     ],
 )
-def test_a_doubt_follows_from_evidence_overlap_and_quality(
-    monkeypatch: pytest.MonkeyPatch, gain: float, contacts: Any, qualities: tuple[float, float], chance: float | None
+def test_a_doubt_follows_from_evidence_distance_and_length(
+    monkeypatch: pytest.MonkeyPatch, gain: float, length_m: float, contacts: Any, log_odds: float | None
 ) -> None:
-    monkeypatch.setattr(search_bodies, "gain_of_two", lambda *_: gain)
-    pair = tuple(replace(candidate(i, c), quality=q) for i, (c, q) in enumerate(zip(contacts, qualities, strict=True)))
+    monkeypatch.setattr(search_bodies, "compared", lambda *_: (gain, length_m))
+    pair = tuple(replace(candidate(i, c), quality=q) for i, (c, q) in enumerate(zip(contacts, (0.5, 0.2), strict=True)))
     found = [d.chance for d in doubts(pair, R, NO_PATH)]
-    assert found == ([] if chance is None else [pytest.approx(chance)])
+    assert found == ([] if log_odds is None else [pytest.approx(1.0 / (1.0 + np.exp(-log_odds)), abs=0.02)])
 
 
 def test_the_chance_of_fewer_bodies_takes_pairs_as_independent() -> None:
@@ -166,11 +164,13 @@ def test_a_missing_object_is_a_part_of_another_one_once_all_is_searched(
     whole = candidate(0, (*LEFT, *RIGHT))
     belief = searched(expected, share).with_exclusion(whole.contour, 0.01, 0)
     belief = replace(belief, path_K_m=belief.path_K_m[np.linalg.norm(belief.path_K_m, axis=1) > 0.075])
-    found = divided(belief, (whole,), R)
-    if number == 1:
-        assert found is None
+    two = division_of(belief, (whole,), R)
+    assert (two is not None and two.is_likelier(belief)) is (number == 2)
+    if two is None or number == 1:
         return
-    assert found is not None
+    odds = np.exp(-3.9 + 0.29 * 12.0) * 1 / 2  # one object is missing, and the one found may be one of the two
+    assert two.share == pytest.approx(odds / (1.0 + odds))
+    found = divided(belief, (whole,), two, R)
     assert found.belief.found == 2
     parts = sorted(found.candidates, key=lambda c: c.contour.centre_K_m[0])
     assert {id(c) for c in parts[0].contacts} == {id(c) for c in LEFT}

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit, joins, lost_among, of_another, part_of
-from glotouch_bt.perception.search.bodies import KNOWN_QUALITY, outline_of
+from glotouch_bt.perception.search.bodies import outline_of
 from glotouch_bt.perception.search.candidates import quality
 from glotouch_bt.perception.touch import Candidate, Contact, signed_distance
+from glotouch_bt.perception.touch.outline import KNOWN_QUALITY
 
 R = 0.006
 LIMB = ((0.0, 0.022, 0, 1), (0.0, -0.022, 0, -1), (0.012, 0.0, 1, 0))

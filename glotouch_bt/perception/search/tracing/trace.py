@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glotouch_bt.perception.search.moves import Move, SearchPlan
-from glotouch_bt.perception.search.tracing.trace_params import Elsewhere, TraceParams
+from glotouch_bt.perception.search.tracing.trace_params import Elsewhere, Taken, TraceParams, none_taken
 from glotouch_bt.perception.search.tracing.trace_state import BEARINGS, OutlineTrace, TraceState, all_bearings, unit
 from glotouch_bt.perception.search.tracing.ways import doubt_on_way, free_column, places_beside, way_round
 from glotouch_bt.perception.touch import Contact
@@ -44,6 +44,7 @@ def trace(
     known: tuple[Contact, ...] = (),
     elsewhere: Elsewhere | None = None,
     joined: Callable[[tuple[Contact, ...]], bool] | None = None,
+    taken: Taken = none_taken,
 ) -> SearchPlan[OutlineTrace]:
     """Trace the outline of a touched object. The ball ends beside it, at sensing height.
 
@@ -55,12 +56,12 @@ def trace(
         round_tip: The section is a disc: fit outlines to its centres, else to the contact points.
         half_extent_m: (2,) limits of |x| and |y| of the ball's centre in K; None: no walls near.
         known: Earlier contacts with the same object, at its current position.
-        elsewhere: See `Elsewhere`.
+        elsewhere, taken: See `Elsewhere` and `Taken`; nothing is felt for where the ball would overlap another object.
         joined: Returns True if the contacts belong to a known object, which ends the trace.
     """
     p = params or TraceParams()
     s = TraceState.begin([*_still(known), first], tip_K_m, tip_radius_m, round_tip, half_extent_m)
-    s.given = len(known)
+    s.given, s.taken = len(known), taken
     yield from _retreat(s, p)
     return (yield from _until_known(s, p, elsewhere, joined))
 
@@ -75,20 +76,23 @@ def trace_more(
     half_extent_m: Array | None = None,
     columns: Callable[[], Array] | None = None,
     elsewhere: Elsewhere | None = None,
+    taken: Taken = none_taken,
 ) -> SearchPlan[OutlineTrace]:
     """Continue the trace of an object from above: hop to where the outline is least certain.
 
     Args:
         known: Its contacts, at its current position.
-        tip_K_m, tip_radius_m, params, round_tip, half_extent_m, elsewhere: As for `trace`; the ball may be raised.
+        tip_K_m, tip_radius_m, params, round_tip, half_extent_m: As for `trace`; the ball may be raised.
+        elsewhere, taken: As for `trace`.
         columns: Returns the places (n, 2) where the ball can come down through felt, free space.
     """
     p = params or TraceParams()
     s = TraceState.begin(_still(known), tip_K_m, tip_radius_m, round_tip, half_extent_m)
-    s.known, s.given, s.columns = len(known), len(known), columns or s.columns
+    s.known, s.given, s.columns, s.taken = len(known), len(known), columns or s.columns, taken
     outline, bearings = s.outline(), all_bearings()
     distance, sd = s.ring(outline, bearings, p)
-    walled = np.any(np.abs(places_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
+    beside = places_beside(outline, bearings, distance, sd, p)
+    walled = np.any(np.abs(beside) > s.half, axis=1) | s.taken(beside)
     for i in _apart(np.where(walled, -1.0, sd), p.misses):
         down, met = yield from _come_down(outline, s, p, float(bearings[i]))
         if not down:
@@ -202,7 +206,8 @@ def _enough(outline: OutlineBelief, s: TraceState, p: TraceParams) -> str:
         or (s.known and s.odd >= 0 and n < s.odd + p.settling)
     ):
         return ""
-    _, sd = s.ring(outline, all_bearings(), p)
+    distance, sd = s.ring(outline, all_bearings(), p)
+    sd = np.where(s.taken(places_beside(outline, all_bearings(), distance, sd, p)), 0.0, sd)
     centre_sd = np.sqrt(outline.centre_sd_m**2 + np.diag(s.shift_covariance(p)))
     if np.max(centre_sd) <= p.centre_sd_m and float(np.max(sd)) <= p.radial_sd_m:
         return "the outline is known"
@@ -222,7 +227,8 @@ def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | Non
     bearings = all_bearings()
     distance, sd = s.ring(outline, bearings, p)
     here = s.bearing(outline)
-    walled = np.any(np.abs(places_beside(outline, bearings, distance, sd, p)) > s.half, axis=1)
+    beside = places_beside(outline, bearings, distance, sd, p)
+    walled, taken = np.any(np.abs(beside) > s.half, axis=1), s.taken(beside)
     over_m = np.where(walled, np.inf, p.hop_m)
     best, worth = None, 0.0
     step = 2 * np.pi / BEARINGS
@@ -236,6 +242,7 @@ def _choose(outline: OutlineBelief, s: TraceState, p: TraceParams) -> _Aim | Non
         gain = sd**p.keen / (np.where(barred, over_m, way) + p.way_m)
         if side == -s.side:
             gain *= p.back
+        gain[taken] = 0.0
         if s.blocked:
             near = np.min(np.abs(wrapped(bearings[:, None] - np.array(s.blocked)[None, :])), axis=1)
             gain[near < np.deg2rad(12.0)] = 0.0

@@ -6,10 +6,22 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from glotouch_bt.perception.touch import Contact
+from glotouch_bt.robot import Array
 
 Elsewhere = Callable[[tuple[Contact, ...], Contact], bool]
 """Function of the contacts of a trace and a new contact: True if the new one belongs to another, known object."""
+
+Taken = Callable[[Array], npt.NDArray[np.bool_]]
+"""Function of places (n, 2) of the ball: (n,) True where it would overlap another, known object."""
+
+
+def none_taken(places_K_m: Array) -> npt.NDArray[np.bool_]:
+    """Return False for all places (n, 2): no other object is known."""
+    return np.zeros(len(places_K_m), dtype=np.bool_)
 
 
 @dataclass(frozen=True, kw_only=True)

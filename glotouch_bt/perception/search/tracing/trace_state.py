@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from glotouch_bt.perception.search.moves import MoveOutcome
-from glotouch_bt.perception.search.tracing.trace_params import TraceParams
+from glotouch_bt.perception.search.tracing.trace_params import Taken, TraceParams, none_taken
 from glotouch_bt.perception.touch import Contact, Contour, split_at_motion
 from glotouch_bt.perception.touch.outline import OutlineBelief, infer_outline, wrapped
 from glotouch_bt.robot import Array
@@ -105,6 +105,7 @@ class TraceState:
         given: Number of contacts in `raw` at the start.
         known: Number of contacts in `raw` from an earlier trace.
         columns: Returns the places (n, 2) where the ball can come down through felt, free space.
+        taken: Returns (n,) True for places (n, 2) of the ball where it would overlap another object.
     """
 
     tip: Array
@@ -125,6 +126,7 @@ class TraceState:
     raised: bool = False
     shift_information: Array = field(default_factory=lambda: np.zeros((2, 2)))
     columns: Callable[[], Array] = lambda: np.zeros((0, 2))
+    taken: Taken = none_taken
 
     @classmethod
     def begin(

@@ -38,6 +38,13 @@ BEARINGS = 72
 """Number of vertices of an outline: 5 degrees apart, 3 mm on an object 60 mm wide."""
 RAYS = 5 * BEARINGS
 """Number of rays of the interpolation table. Its error is 0.02 mm where the prediction is smooth."""
+USUAL_WIDTH_M = 0.076
+"""Width up to which objects are usual. Source: the largest disc of the search (`search.remaining.USUAL`)."""
+WIDE_NATS_PER_M = 500.0
+"""Log evidence that each metre of a larger width costs: wide contacts are more often those of two objects than of one.
+Source: ours."""
+ACROSS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(24) * math.pi / 24]).T
+"""(2, 24) directions, 7.5 degrees apart, across which the width is measured: 0.2 % more than the least width at most."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +63,10 @@ class OutlineBelief:
 
     @cached_property
     def log_evidence(self) -> float:
-        """Log marginal likelihood of the contacts; compares groupings of the same contacts."""
-        return self.hypotheses[0].log_evidence - math.log(self.weights[0]) / TEMPER
+        """Log marginal likelihood of the contacts, and the prior of their width; compares groupings of contacts."""
+        across_m = np.ptp(self.touches.current.tips_m @ ACROSS, axis=0) - 2.0 * self.touches.radius_m
+        wide_m = max(float(across_m.min()) - USUAL_WIDTH_M, 0.0)
+        return self.hypotheses[0].log_evidence - math.log(self.weights[0]) / TEMPER - WIDE_NATS_PER_M * wide_m
 
     @cached_property
     def family(self) -> ContourFamily:

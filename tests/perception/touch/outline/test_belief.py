@@ -6,6 +6,7 @@ from scipy.spatial import ConvexHull
 
 from glotouch_bt.perception import touch
 from glotouch_bt.perception.touch import current_tips, infer_outline, signed_distance
+from glotouch_bt.perception.touch.outline import mixture
 from glotouch_bt.perception.touch.outline.primitives import rounded, wrapped
 from glotouch_bt.robot import ParamError
 from tests.perception.touch.outline.conftest import rectangle, turned
@@ -218,3 +219,14 @@ def test_rectangle_reaches_its_contacts(contacts):
     c, s = np.cos(yaw), np.sin(yaw)
     over = np.maximum(np.abs((tips - (x, y)) @ np.array([[c, -s], [s, c]])) - half, 0.0)
     assert np.linalg.norm(over, axis=1).max() - R < 0.002
+
+
+@pytest.mark.parametrize(("long_m", "short_m", "nats"), [(0.100, 0.090, 7.0), (0.100, 0.076, 0.0), (0.060, 0.060, 0.0)])
+def test_wide_contacts_are_less_likely_those_of_one_object(monkeypatch, long_m, short_m, nats):
+    """Half a nat for each millimetre beyond 76 mm, across the narrowest direction."""
+    x, y = 0.5 * long_m, 0.5 * short_m
+    sides = [(s * (x + R), t * 0.5 * y) for s in (1, -1) for t in (1, -1)]
+    sides += [(s * 0.5 * x, t * (y + R)) for s in (1, -1) for t in (1, -1)]
+    with_prior = infer_outline(np.array(sides), R).log_evidence
+    monkeypatch.setattr(mixture, "WIDE_NATS_PER_M", 0.0)
+    assert infer_outline(np.array(sides), R).log_evidence - with_prior == pytest.approx(nats)
