@@ -44,7 +44,7 @@ WIDE_NATS_PER_M = 500.0
 """Log evidence that each metre of a larger width costs: wide contacts are more often those of two objects than of one.
 Source: ours."""
 ACROSS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(24) * math.pi / 24]).T
-"""(2, 24) directions, 7.5 degrees apart, across which the width is measured: 0.2 % more than the least width at most."""
+"""(2, 24) directions, 7.5 degrees apart, across which the width is measured: up to 0.2 % more than the least one."""
 
 
 @dataclass(frozen=True)
