@@ -181,16 +181,16 @@ def division_of(belief: SearchMap, known: tuple[Candidate, ...], radius_m: float
     return Division(whole, tuple(sorted(parts, key=len, reverse=True)), even)
 
 
-def divided(belief: SearchMap, known: tuple[Candidate, ...], division: Division, radius_m: float) -> Admitted:
+def divided(belief: SearchMap, known: tuple[Candidate, ...], two: Division, radius_m: float) -> Admitted:
     """Return map and candidates with the two bodies of a candidate.
 
     Args:
         belief, known: Map and candidates.
-        division: The candidate and its parts.
+        two: The candidate and its parts.
         radius_m: Radius of the ball.
     """
     margin_m = {e.index: e.given_margin_m for e in belief.exclusions}
-    return _with_parts(belief, known, division.whole, division.parts, radius_m, margin_m[division.whole.index])
+    return _with_parts(belief, known, two.whole, two.parts, radius_m, margin_m[two.whole.index])
 
 
 def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclusion_m: float) -> Admitted:

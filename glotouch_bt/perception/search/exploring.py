@@ -24,8 +24,8 @@ from glotouch_bt.perception.touch import Candidate, Contact
 from glotouch_bt.robot import Array
 
 WORTH_DIVIDING = 0.2
-"""Share of the places left above which no candidate is more probably two bodies than a missing object is hidden there.
-Source: `TWO_BODIES`, with two objects missing."""
+"""Share of the places left above which the search goes on without asking whether a candidate is two bodies: divisions
+take time to compute, and are hardly ever likelier than a hidden object then. Source: ours."""
 CHECKED_CHANCE = 0.1
 """Minimum probability that two candidates are one body for one of them to be traced further. Source: ours."""
 CHECKED_CONTACTS = 12
