@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import glotouch_bt.perception.search.bodies as search_bodies
-from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit
+from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit, search_policy, seek_next
 from glotouch_bt.perception.search.bodies import (
     Doubt,
     bodies,
@@ -175,6 +175,22 @@ def test_a_missing_object_is_a_part_of_another_one_once_all_is_searched(
     parts = sorted(found.candidates, key=lambda c: c.contour.centre_K_m[0])
     assert {id(c) for c in parts[0].contacts} == {id(c) for c in LEFT}
     assert [e.given_margin_m for e in found.belief.exclusions] == pytest.approx([0.01, 0.01])
+
+
+@pytest.mark.parametrize(("share", "divides"), [(0.85, True), (0.5, False)])
+def test_a_candidate_is_divided_as_soon_as_a_hidden_object_is_less_likely(share: float, divides: bool) -> None:
+    """With 11 % of the places left, the search ends without another move; with 48 % it goes on."""
+    whole = candidate(0, (*LEFT, *RIGHT))
+    belief = searched(2, share).with_exclusion(whole.contour, 0.01, 0)
+    belief = replace(belief, path_K_m=belief.path_K_m[np.linalg.norm(belief.path_K_m, axis=1) > 0.075])
+    plan = seek_next(belief, (whole,), search_policy("expected_find", 0), np.array([0.13, 0.18]), R, lowered=True)
+    if not divides:
+        assert next(plan).kind in ("sweep", "hop")
+        return
+    with pytest.raises(StopIteration) as ended:
+        next(plan)
+    sought, known = ended.value.value
+    assert (sought.contact, sought.belief.complete, len(known)) == (None, True, 2)
 
 
 def test_the_gain_of_a_division_is_that_of_its_parts() -> None:
