@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import glotouch_bt.perception.search.bodies as search_bodies
+import glotouch_bt.perception.search.candidates as candidates
 from glotouch_bt.perception.search import OutlineTrace, SearchMap, admit, search_policy, seek_next
 from glotouch_bt.perception.search.bodies import (
     Doubt,
@@ -178,8 +179,11 @@ def test_a_missing_object_is_a_part_of_another_one_once_all_is_searched(
 
 
 @pytest.mark.parametrize(("share", "divides"), [(0.85, True), (0.5, False)])
-def test_a_candidate_is_divided_as_soon_as_a_hidden_object_is_less_likely(share: float, divides: bool) -> None:
+def test_a_candidate_is_divided_as_soon_as_a_hidden_object_is_less_likely(
+    monkeypatch: pytest.MonkeyPatch, share: float, divides: bool
+) -> None:
     """With 11 % of the places left, the search ends without another move; with 48 % it goes on."""
+    monkeypatch.setattr(candidates, "doubts", lambda *_: ())
     whole = candidate(0, (*LEFT, *RIGHT))
     belief = searched(2, share).with_exclusion(whole.contour, 0.01, 0)
     belief = replace(belief, path_K_m=belief.path_K_m[np.linalg.norm(belief.path_K_m, axis=1) > 0.075])
