@@ -81,6 +81,7 @@ def test_parts_of_one_body_are_doubtful_and_bodies_far_apart_are_not() -> None:
         (0.0, 0.060, (LEFT, LEFT[:3]), 5.2 - 0.0285 * 60.0),  # the contacts of one lie on the outline of the other
         (40.0, 0.060, (LEFT, LEFT[:3]), 5.2 - 0.021 * 40.0 - 0.0285 * 60.0),
         (500.0, 0.100, (LEFT, LEFT[:3]), 5.2 - 0.021 * 120.0 - 0.0285 * 100.0),
+        (0.0, 0.060, (LEFT, RIGHT), 5.2 - 0.085 * 32.5 - 0.0285 * 60.0),  # median of 17 to 40 mm
         (120.0, 0.200, (LEFT, RIGHT), None),  # two bodies almost for certain
     ],
 )
