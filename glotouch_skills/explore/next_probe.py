@@ -81,6 +81,8 @@ class NextProbe(Skill):
             self.event("note", text=f"candidate {new.index} is left out: nothing stands where it was traced")
         model = self._target()
         candidates = self._distinct(candidates, model)
+        if gone := sorted({c.index for c in self.known} - {c.index for c in candidates}):
+            self.event("forgotten", why="the same body as another one, or not there", candidates=gone)
         topped = {c.index for c in candidates if c.top_touched}
         lost = {c.index for c in self.known if c.top_touched} - topped  # what was touched there was another body
         before = tuple(t for t in before if t.part != "top" or t.candidate not in lost)
@@ -106,9 +108,12 @@ class NextProbe(Skill):
         radius_m = self.tool.tip_radius_m if self.tool is not None and self.tool.round else 0.0
         apart = separated(candidates, radius_m, felt)
         kept = distinct(apart, felt)
-        altered = sorted(c.index for c in apart if not any(c is old for old in candidates))
+        altered = [c for c in apart if not any(c is old for old in candidates)]
         if altered:
-            self.event("note", text=f"contacts were shared out anew among candidates {', '.join(map(str, altered))}")
+            names = ", ".join(str(c.index) for c in altered)
+            self.event("note", text=f"contacts were shared out anew among candidates {names}")
+        for candidate in altered:
+            self.event("candidate", candidate=candidate)
         for index in sorted({c.index for c in candidates} - {c.index for c in kept}):
             self.event("note", text=f"candidate {index} is left out: it is the same body as another one")
         if model is None:

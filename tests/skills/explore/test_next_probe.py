@@ -28,6 +28,7 @@ def asked(bench, folder):
         skill = b.make(NextProbe, inputs={"known": known, **inputs}, target=target)
         b.run(skill)
         assert not [c for c in b.commands if c.motion is not None]
+        ask.of_kind = b.of_kind
         return skill
 
     return ask
@@ -92,8 +93,18 @@ def test_what_was_measured_last_replaces_what_was_known(asked, things) -> None:
 def test_what_is_gone_is_no_candidate_any_more(asked, things, chosen: str, kept: list[int]) -> None:
     skill = asked(things, measured=things[1], chosen=chosen, gone=True, before=(ProbeTouch(1, chosen),))
     assert [c.index for c in skill.candidates] == kept
+    assert [e["candidates"] for e in asked.of_kind("forgotten")] == ([[1]] if chosen == "top" else [])
     alone = asked(things[1:2], measured=things[1], chosen=chosen, gone=True, before=(ProbeTouch(1, chosen),))
     assert alone.candidates == things[1:2], "one is kept: without any there would be nothing to trace anew"
+
+
+def test_contacts_that_pass_to_a_neighbour_are_recorded_with_both(asked, found, tool) -> None:
+    """A contact with the second disc was traced with the first one."""
+    one, other = found.round((0.0, 0.0), 0.03), found.round((0.065, 0.0), 0.03, index=1)
+    mixed = replace(one, contacts=(*one.contacts, other.contacts[-1])), replace(other, contacts=other.contacts[:-1])
+    skill = asked(mixed, tool=tool)
+    now = {c["candidate"].index: len(c["candidate"].contacts) for c in asked.of_kind("candidate")}
+    assert now == {c.index: len(c.contacts) for c in skill.candidates} == {0: len(one.contacts), 1: len(other.contacts)}
 
 
 def test_begun_anew_it_keeps_what_was_found_since(asked, things) -> None:
