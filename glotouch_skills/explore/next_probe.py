@@ -77,12 +77,11 @@ class NextProbe(Skill):
         new, before = self.measured if self.chosen else None, self.before or ()
         candidates = tuple(new if new is not None and new.index == c.index else c for c in self.known)
         if new is not None and self.gone and self.chosen == "top" and len(candidates) > 1:
-            candidates = tuple(c for c in candidates if c.index != new.index)
-            self.event("note", text=f"candidate {new.index} is left out: nothing stands where it was traced")
+            there = tuple(c for c in candidates if c.index != new.index)
+            self._leave_out(candidates, there, "nothing stands where it was traced")
+            candidates = there
         model = self._target()
         candidates = self._distinct(candidates, model)
-        if gone := sorted({c.index for c in self.known} - {c.index for c in candidates}):
-            self.event("forgotten", why="the same body as another one, or not there", candidates=gone)
         topped = {c.index for c in candidates if c.top_touched}
         lost = {c.index for c in self.known if c.top_touched} - topped  # what was touched there was another body
         before = tuple(t for t in before if t.part != "top" or t.candidate not in lost)
@@ -108,20 +107,21 @@ class NextProbe(Skill):
         radius_m = self.tool.tip_radius_m if self.tool is not None and self.tool.round else 0.0
         apart = separated(candidates, radius_m, felt)
         kept = distinct(apart, felt)
-        altered = [c for c in apart if not any(c is old for old in candidates)]
+        self._leave_out(candidates, kept, "the same body as another one")
+        whole = kept if model is None else joined(model, kept, felt)
+        self._leave_out(kept, whole, "with another one it is one body, the target's")
+        altered = [c for c in whole if not any(c is old for old in candidates)]
         if altered:
             names = ", ".join(str(c.index) for c in altered)
             self.event("note", text=f"contacts were shared out anew among candidates {names}")
         for candidate in altered:
             self.event("candidate", candidate=candidate)
-        for index in sorted({c.index for c in candidates} - {c.index for c in kept}):
-            self.event("note", text=f"candidate {index} is left out: it is the same body as another one")
-        if model is None:
-            return kept
-        whole = joined(model, kept, felt)
-        for index in sorted({c.index for c in kept} - {c.index for c in whole}):
-            self.event("note", text=f"candidate {index} is left out: with another one it is one body, the target's")
         return whole
+
+    def _leave_out(self, before: tuple[Candidate, ...], after: tuple[Candidate, ...], why: str) -> None:
+        """Record which candidates are left out, so that reports and views no longer show them as objects."""
+        if gone := sorted({c.index for c in before} - {c.index for c in after}):
+            self.event("forgotten", why=why, candidates=gone)
 
     def _by_target(
         self, model: TargetModel, candidates: tuple[Candidate, ...], left: list[ProbeTouch]
