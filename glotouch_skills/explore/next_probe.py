@@ -30,6 +30,7 @@ class NextProbeParams(SkillParams):
         default="",
         names="stl",
     )
+    outlines_only: bool = param("Without a target, leave the tops for later", default=False)
 
 
 class NextProbe(Skill):
@@ -37,7 +38,7 @@ class NextProbe(Skill):
 
     Repeat it, and make what it chose with `refine_outline` or `touch_top`, until `measured_enough`. A candidate that
     the target's STL excludes already is not measured. One that is probably not needed is put off, but only until the
-    jaws have been used. Without a target all are measured, the least certain outline first.
+    jaws have been used. Without a target all are measured, the least certain outline first, and the tops last.
 
     Contacts pass to the candidate that explains them better: a trace may have passed on to a neighbour. Two candidates
     that are one body become one in `candidates`: they overlap, or they are parts of the target. One without a top is
@@ -86,7 +87,8 @@ class NextProbe(Skill):
         lost = {c.index for c in self.known if c.top_touched} - topped  # what was touched there was another body
         before = tuple(t for t in before if t.part != "top" or t.candidate not in lost)
         tried = {(t.candidate, t.part) for t in before}
-        left = [ProbeTouch(c.index, part) for c in candidates for part in PARTS if (c.index, part) not in tried]
+        parts = PARTS[:1] if self.params.outlines_only and model is None else PARTS
+        left = [ProbeTouch(c.index, part) for c in candidates for part in parts if (c.index, part) not in tried]
         self.postponed = 0
         touch = _worst_known(candidates, left) if model is None else self._by_target(model, candidates, left)
         self.candidates, self.measured_enough = candidates, touch is None
@@ -163,7 +165,6 @@ def _indices(touches: list[ProbeTouch]) -> set[int]:
 
 
 def _worst_known(candidates: tuple[Candidate, ...], left: list[ProbeTouch]) -> ProbeTouch | None:
-    """Return the next measurement of all: one candidate after the other, the least certain outline first."""
-    begun = {t.candidate for t in left if t.part == "top"} - {t.candidate for t in left if t.part == "outline"}
+    """Return the next measurement of all: the outlines, the least certain one first, and then the tops."""
     quality = {c.index: c.quality for c in candidates}
-    return min(left, key=lambda t: (t.candidate not in begun, quality[t.candidate], PARTS.index(t.part)), default=None)
+    return min(left, key=lambda t: (PARTS.index(t.part), quality[t.candidate]), default=None)

@@ -55,7 +55,7 @@ def summarise(rows: Sequence[Row], policies: Sequence[str], objects: int) -> dic
 
 
 def discovery(rows: Sequence[Row], objects: int) -> dict[str, Any]:
-    """Return mean discoveries and completion rate at each travel, and the share of objects found in the end.
+    """Return mean discoveries and completion rate at each travel and in the end, and the share found in the end.
 
     An aborted trial counts up to its end.
     """
@@ -64,6 +64,7 @@ def discovery(rows: Sequence[Row], objects: int) -> dict[str, Any]:
     return {
         "mean_discovered": {f"{d:g}": bootstrap_mean([discovered_at(r, d) for r in rows]) for d in MEAN_AT_M},
         "complete": {f"{d:g}": wilson(sum(discovered_at(r, d) >= objects for r in rows), n) for d in COMPLETE_AT_M},
+        "complete_in_the_end": wilson(sum(len(r["discovered_m"]) >= objects for r in rows), n),
         "found_share": bootstrap_mean([len(r["discovered_m"]) / objects for r in rows]),
         "travel_to_complete_m": quantiles(ends),
         "false_candidates": bootstrap_mean([r["false_candidates"] for r in rows]),

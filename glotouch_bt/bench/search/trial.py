@@ -122,7 +122,8 @@ def scene(mission: str, objects: Path | None, world: str | None = None) -> tuple
 def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, Any]:
     """Score the discoveries of a recorded run against its truth.
 
-    `contact_gap_mm` are the distances of the ball from the true probe section where sweeps stopped.
+    A candidate that was forgotten counts as never traced. `contact_gap_mm` are the distances of the ball from the true
+    probe section where sweeps stopped.
 
     Raises:
         BadInput: The record has no truth beside it.
@@ -135,7 +136,12 @@ def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, 
     heights = {e.data["candidate"]: float(e.data["height_m"]) for e in record.of_kind("top")}
     traced: dict[int, list[tuple[float, Any]]] = {}
     final: dict[int, tuple[float, Any]] = {}
-    for e in record.of_kind("candidate"):
+    for e in record.of_kind("candidate", "forgotten"):
+        if e.kind == "forgotten":
+            for gone in e.data["candidates"]:
+                traced.pop(gone, None)
+                final.pop(gone, None)
+            continue
         index = int(e.data["candidate"]["index"])
         if index not in final or e.data["node"] != TOP_NODE:
             final[index] = (e.stamp_s, e.data["candidate"])

@@ -66,10 +66,10 @@ def seek(
         enough: Share of the places left below which the search for a known number ends.
     """
     tip, hops, cornered = np.asarray(tip_K_m, dtype=np.float64)[:2], 0, False
-    while (lowered and belief.hints) or not (belief.complete or belief.is_searched(enough)):
-        if lowered and belief.hints:
+    while belief.hints or not (belief.complete or belief.is_searched(enough)):
+        if belief.hints:
             hint, belief = belief.hints[0], belief.with_hints(belief.hints[1:])
-            belief, contact, tip = yield from _follow(belief, hint, tip)
+            belief, contact, tip, lowered = yield from _follow(belief, hint, tip, lowered=lowered)
             if contact is not None:
                 outcome = yield Move("retreat", tip - RETREAT_M * contact.approach_K[:2])
                 return Sought(belief.with_path(outcome.path_K_m), contact, True, outcome.tip_K_m)
@@ -118,24 +118,35 @@ def seek(
     return Sought(belief, None, lowered, tip)
 
 
-def _follow(belief: SearchMap, hint: Contact, tip: Array) -> SearchPlan[tuple[SearchMap, Contact | None, Array]]:
-    """Sweep to the position of a hint and touch it again; return map, contact or None, and the ball's position."""
+def _follow(
+    belief: SearchMap, hint: Contact, tip: Array, *, lowered: bool
+) -> SearchPlan[tuple[SearchMap, Contact | None, Array, bool]]:
+    """Go to the position of a hint and touch it again; a raised ball is lowered beside it.
+
+    Returns:
+        Map, contact or None, position of the ball, and True if it is at sensing height.
+    """
     against = hint.reaction_K[:2] / max(float(np.linalg.norm(hint.reaction_K[:2])), 1e-9)
     before = hint.tip_K_m[:2] + HINT_BEFORE_M * against
     past = hint.tip_K_m[:2] - HINT_PAST_M * against
     if belief.knows(hint) or not bool(belief.inside_extent(before[None])[0]):
-        return belief, None, tip
-    way = Routes(belief, tip).to(before)
+        return belief, None, tip, lowered
+    way = Routes(belief, tip).to(before) if lowered else ()
     if way is None:
-        return belief, None, tip
+        return belief, None, tip, lowered
+    if not lowered:
+        outcome = yield Move("hop", before)
+        tip, belief = outcome.tip_K_m, belief.with_path(outcome.path_K_m)
+        if outcome.refused or outcome.contact is not None:
+            return belief, None, tip, False
     for waypoint in (*way, past):
         outcome = yield Move("sweep", waypoint)
         tip, belief = outcome.tip_K_m, belief.with_path(outcome.path_K_m)
         if outcome.refused or outcome.contact is not None:
             break
     if outcome.contact is None or belief.knows(outcome.contact):
-        return belief, None, tip
-    return belief, outcome.contact, tip
+        return belief, None, tip, True
+    return belief, outcome.contact, tip, True
 
 
 def _from_its_side(belief: SearchMap, landed: MoveOutcome) -> SearchPlan[tuple[SearchMap, Contact | None, Array, bool]]:

@@ -15,7 +15,7 @@ import pytest
 from glotouch_bt.bench.search.bench import SearchCampaign, run_campaign
 from glotouch_bt.bench.search.scoring import Found, TrueLayout, discovered_at, score
 from glotouch_bt.bench.search.summary import correlation, quantiles, summarise
-from glotouch_bt.bench.search.trial import TipPath, recorded_folders
+from glotouch_bt.bench.search.trial import TipPath, recorded_folders, score_run
 from glotouch_bt.report.run_record import RecordedEvent, RunRecord, Tick
 from glotouch_bt.robot import BadInput
 
@@ -97,6 +97,7 @@ def test_a_trial_that_broke_off_counts_as_far_as_it_came():
     assert figures["mean_discovered"]["3"]["mean"] == pytest.approx(1.0)
     assert figures["complete"]["3"]["rate"] == pytest.approx(1 / 3)
     assert figures["complete"]["3"]["n"] == 3
+    assert figures["complete_in_the_end"]["rate"] == pytest.approx(1 / 3)
     assert figures["found_share"]["mean"] == pytest.approx(0.5)
     assert figures["ended"] == {"complete": 1, "safety_stop": 1, "traceback": 1}
 
@@ -145,6 +146,25 @@ def test_travel_of_a_record_counts_from_the_first_sweep_to_the_last_trace():
     assert way.total_m == pytest.approx(0.2, abs=0.006)
     assert way.travel_m(2.0) == pytest.approx(0.1, abs=0.004)
     assert way.travel_m(99.0) == way.total_m
+
+
+def test_what_was_forgotten_is_not_found():
+    """Two candidates are traced where the two objects stand. The second one is forgotten, and never found again."""
+    here = {"position_m": [0.0, 0.0, 0.0], "quat": [1.0, 0.0, 0.0, 0.0]}
+    there = here | {"position_m": [0.1, 0.0, 0.0]}
+    objects = [{"name": "thing", "pose_B_O": here}, {"name": "thing", "pose_B_O": there}]
+
+    def traced(index: int, x_m: float) -> RecordedEvent:
+        contour = {"centre_K_m": [x_m, 0.0], "kind": "round", "yaw_rad": 0.0}
+        candidate = {"index": index, "contour": contour, "contacts": []}
+        return RecordedEvent(1.0, "candidate", {"candidate": candidate, "node": "orbit_probe", "displaced_m": 0.0})
+
+    both = [traced(0, 0.01), traced(1, 0.11)]
+    for more, found in (([], 2), ([RecordedEvent(2.0, "forgotten", {"candidates": [1]})], 1)):
+        record = RunRecord(Path("x"), run={"container": {"pose_B_K": here}}, events=[*both, *more])
+        record.truth = {"start": objects, "end": objects}
+        row = score_run(record, {"thing": thing()})
+        assert (len(row["discovered_m"]), row["false_candidates"]) == (found, 0)
 
 
 def test_a_record_without_exploration_has_no_travel():

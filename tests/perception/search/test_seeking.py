@@ -225,20 +225,27 @@ def test_a_hint_is_followed_before_the_policy_is_asked() -> None:
     assert sought.belief.hints == ()
 
 
-def test_a_hint_is_followed_once_the_ball_is_down() -> None:
+@pytest.mark.parametrize("occupied", [False, True])
+def test_a_raised_ball_is_lowered_beside_a_hint(occupied: bool) -> None:
+    """If something stands there, the hint is given up."""
     start, place = np.array([-0.1, 0.0]), np.array([0.06, 0.0])
     hint = touch(place, np.array([1.0, 0.0]))
 
     def answer(move: Move, tip: Array) -> MoveOutcome:
+        if move.kind == "hop" and occupied and move.goal_K_m[0] > 0.0:
+            return MoveOutcome(move.goal_K_m, np.zeros((0, 2)), touch(move.goal_K_m, np.array([0.0, 1.0])))
         if move.kind == "sweep" and move.goal_K_m[0] > place[0]:
             return MoveOutcome(place, np.array([tip, place]), touch(place, move.goal_K_m - tip))
         return free(move, tip)
 
     policy = Towards((-0.1, 0.15), raised=True)
     sought, moves = run(seek(blank().with_hints((hint,)), policy, start, lowered=False), start, answer)
-    assert next(m.kind for m in moves) == "hop"
-    assert sought.contact is not None
-    np.testing.assert_allclose(sought.contact.tip_K_m[:2], place)
+    assert (moves[0].kind, sought.belief.hints) == ("hop", ())
+    assert np.hypot(*(moves[0].goal_K_m - place)) < 0.02
+    assert (sought.contact is None) == occupied
+    if not occupied:
+        assert [m.kind for m in moves] == ["hop", "sweep", "retreat"]
+        np.testing.assert_allclose(sought.contact.tip_K_m[:2], place)
 
 
 def test_a_hint_on_a_traced_object_is_passed_over() -> None:

@@ -22,10 +22,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory):
 
 @pytest.fixture
 def asked(bench, folder):
-    def ask(known, target="", **inputs):
+    def ask(known, target="", params=None, **inputs):
         b = bench()
         b.context.world = replace(b.world, objects=replace(b.world.objects, folder=folder))
-        skill = b.make(NextProbe, inputs={"known": known, **inputs}, target=target)
+        skill = b.make(NextProbe, inputs={"known": known, **inputs}, target=target, **params or {})
         b.run(skill)
         assert not [c for c in b.commands if c.motion is not None]
         ask.of_kind = b.of_kind
@@ -44,11 +44,11 @@ def things(found):
     return tuple(replace(c, height_m=z, quality=q) for c, z, q in known)
 
 
-def walk(asked, known, target=""):
+def walk(asked, known, target="", **params):
     """Return (candidate, part) of all measurements, and the last answer."""
     made, inputs = [], {}
     for _ in range(20):
-        skill = asked(known, target, **inputs)
+        skill = asked(known, target, params, **inputs)
         assert skill.status is Status.SUCCESS, skill.feedback_message
         if skill.measured_enough:
             assert skill.next_part == ""
@@ -58,11 +58,18 @@ def walk(asked, known, target=""):
     pytest.fail("it never ends")
 
 
-def test_without_a_target_everything_is_measured_the_worst_known_first(asked, things) -> None:
+def test_without_a_target_all_outlines_come_first_the_least_known_before_the_others(asked, things) -> None:
     made, last = walk(asked, things)
-    assert made == [(i, part) for i in (1, 2, 0) for part in ("outline", "top")]
+    assert made == [(i, part) for part in ("outline", "top") for i in (1, 2, 0)]
     assert last.unmeasured == 0
     assert last.probed == tuple(ProbeTouch(i, part) for i, part in made)
+
+
+def test_the_tops_can_be_left_for_later_without_a_target(asked, things) -> None:
+    made, _ = walk(asked, things, outlines_only=True)
+    assert made == [(i, "outline") for i in (1, 2, 0)]
+    made, _ = walk(asked, things, "can", outlines_only=True)
+    assert sorted(part for _, part in made) == ["outline", "top"]
 
 
 def test_with_a_target_only_what_may_be_it_is_measured(asked, things) -> None:
@@ -86,7 +93,7 @@ def test_what_was_measured_last_replaces_what_was_known(asked, things) -> None:
     new = replace(things[1], height_m=0.05)
     skill = asked(things, measured=new, chosen="outline", before=(ProbeTouch(1, "outline"),))
     assert skill.candidates == (things[0], new, things[2])
-    assert (skill.candidate, skill.next_part) == (new, "top")
+    assert (skill.candidate, skill.next_part) == (things[2], "outline"), "the next one"
 
 
 @pytest.mark.parametrize(("chosen", "kept"), [("top", [0, 2]), ("outline", [0, 1, 2])])
@@ -109,7 +116,7 @@ def test_contacts_that_pass_to_a_neighbour_are_recorded_with_both(asked, found, 
 
 def test_begun_anew_it_keeps_what_was_found_since(asked, things) -> None:
     """`candidate` is still the one that was measured last, the search has gone on meanwhile."""
-    made = tuple(ProbeTouch(i, part) for i in (1, 2, 0) for part in ("outline", "top"))
+    made = tuple(ProbeTouch(i, part) for i in (0, 2, 1) for part in ("outline", "top"))
     skill = asked(things, measured=replace(things[0], height_m=0.05), chosen="", before=made)
     assert skill.measured_enough
     assert skill.candidates == things

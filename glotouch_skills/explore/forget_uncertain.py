@@ -1,0 +1,99 @@
+"""Forget outlines that cannot be right, so that the search finds these objects again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+from glotouch_bt.perception.recognition import ProbeTouch
+from glotouch_bt.perception.search import OVERLAP_M, SearchMap, overlap_depth_m
+from glotouch_bt.perception.touch import Candidate
+from glotouch_bt.perception.touch.outline import KNOWN_QUALITY
+from glotouch_bt.robot import HOLD
+from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
+
+AROUND_M = 0.02
+"""Distance around a forgotten outline within which the floor is searched again. Source: ours; objects that are traced
+move by up to 20 mm."""
+
+MISSING = "fewer objects are known than expected"
+"""Why the search goes on without a wrong outline."""
+
+
+class ForgetUncertainParams(SkillParams):
+    """Parameters of `forget_uncertain`."""
+
+    times: int = param("Largest number of times that the search goes on", default=2, ge=0, le=20)
+
+
+class ForgetUncertain(Skill):
+    """Forget the outlines that are still uncertain after they were refined, or overlap others.
+
+    An object that is pushed while it is traced leaves such an outline: its contacts are from several places. Further
+    contacts do not mend it. The search goes back to where it was touched, and traces it with new contacts only. It goes
+    on, too, if fewer candidates are left than objects are expected: two of them turned out to be one body.
+
+    SUCCESS: `candidates` and `map` have no such outline. `certain` is true if there was none and no object is missing,
+    or if the search went on often enough.
+    """
+
+    Params = ForgetUncertainParams
+    params: ForgetUncertainParams
+
+    NOTHING_SEARCHED = Failure("nothing_searched", "there is no map yet", advice="sweep first, with guarded_sweep")
+
+    before = In(SearchMap, "what has been explored so far", key="map", required=False)
+    known = In(tuple, "all candidates", key="candidates", element=Candidate, required=False)
+    before_probed = In(tuple, "measurements so far", key="probed", element=ProbeTouch, required=False)
+    before_retraced = In(tuple, "why the search went on so far", key="retraced", element=tuple, required=False)
+    map = Out(SearchMap, "where to search now")
+    candidates = Out(tuple, "the other candidates", element=Candidate)
+    probed = Out(tuple, "measurements of the other candidates", element=ProbeTouch)
+    certain = Out(bool, "the search need not go on")
+    retraced = Out(tuple, "why the search went on so far, as in the report", element=tuple)
+
+    def run(self) -> SkillRun:
+        """See the class."""
+        yield HOLD
+        if self.before is None:
+            raise self.NOTHING_SEARCHED("there is no map yet")
+        known, probed, rows = self.known or (), self.before_probed or (), self.before_retraced or ()
+        refined = {t.candidate for t in probed if t.part == "outline"}
+        wrong = _wrong(tuple(c for c in known if c.index in refined))
+        belief = self.before.only_with(known)
+        missing = belief.expected is not None and belief.found < belief.expected
+        times = len({row[0] for row in rows})
+        self.certain = not (wrong or missing) or times >= self.params.times
+        self.map, self.candidates, self.probed, self.retraced = belief, known, probed, rows
+        if self.certain:
+            return
+        gone = tuple(c for c in known if c.index in wrong)
+        self.candidates = tuple(c for c in known if c.index not in wrong)
+        self.probed = tuple(t for t in probed if t.candidate not in wrong)
+        belief = belief.only_with(self.candidates)
+        for candidate in gone:
+            belief = belief.unsearched(candidate.contour, AROUND_M)
+            belief = belief.with_hints((*belief.hints, *reversed(candidate.contacts)))
+            self.context.arm.felt.forget_free_near(candidate.contour.centre_K_m)
+            self.event("forgotten", why=wrong[candidate.index], candidates=(candidate.index,))
+        if belief.expected is not None:
+            belief = replace(belief, expected=max(belief.expected, len(known)))
+        self.map = belief
+        reasons = [(str(i), why) for i, why in wrong.items()] or [("-", MISSING)]
+        self.retraced = (*rows, *((str(times + 1), *reason) for reason in reasons))
+        self.report(
+            "Traced anew",
+            "What cannot be right was forgotten, and the search went on.",
+            ("round", "forgotten candidate", "why"),
+            self.retraced,
+        )
+
+
+def _wrong(candidates: tuple[Candidate, ...]) -> dict[int, str]:
+    """Return the candidates whose outline cannot be right, and why: the less certain one of two that overlap."""
+    wrong = {c.index: "its outline is still uncertain" for c in candidates if c.quality < KNOWN_QUALITY}
+    for one, other in combinations((c for c in candidates if c.index not in wrong), 2):
+        if overlap_depth_m(one.contour, other.contour) > OVERLAP_M:
+            worse, better = sorted((one, other), key=lambda c: c.quality)
+            wrong.setdefault(worse.index, f"its outline overlaps that of candidate {better.index}")
+    return wrong
