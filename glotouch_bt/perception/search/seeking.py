@@ -66,7 +66,7 @@ def seek(
         enough: Share of the places left below which the search for a known number ends.
     """
     tip, hops, cornered = np.asarray(tip_K_m, dtype=np.float64)[:2], 0, False
-    while belief.hints or not (belief.complete or belief.is_searched(enough)):
+    while (belief.hints and (lowered or not belief.complete)) or not (belief.complete or belief.is_searched(enough)):
         if belief.hints:
             hint, belief = belief.hints[0], belief.with_hints(belief.hints[1:])
             belief, contact, tip, lowered = yield from _follow(belief, hint, tip, lowered=lowered)
