@@ -130,7 +130,8 @@ CASES = [
     ("run pick_at --set width=0.05", "--set width: width = 0.05: must be in [3, 80] mm"),
     (
         "run survey --set nonsense=1",
-        "--set nonsense: mission 'survey' has no such parameter (valid: expected_objects, left_below, policy, retraces); unknown",
+        "--set nonsense: mission 'survey' has no such parameter (valid: expected_objects, left_below, policy, "
+        "retraces); unknown",
     ),
     ("run survey --set layout=here", "option layout = 'here': must be a mapping of object names"),
     ("run survey --set layout={apple", "--set layout: begins like JSON but is not"),

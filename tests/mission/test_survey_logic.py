@@ -83,7 +83,7 @@ def test_a_search_that_cannot_go_on_ends_safely(scripted: Any) -> None:
 
     def sweeps(call: Call) -> Any:
         swept.append(call)
-        return ok() if len(swept) == 1 else fails("tool_lost")
+        return ok() if len(swept) == 1 else fails("tool_lost", exhausted=False)
 
     run = run_survey(scripted, 1, **{"guarded_sweep*": sweeps, "tool_check*": ok()})
     assert not run.succeeded
