@@ -16,7 +16,7 @@ from typing import Any
 from glotouch_bt.mission.check.data_flow import DataFlow
 from glotouch_bt.mission.check.live_variables import deciding, living
 from glotouch_bt.mission.check.requirements import verdicts
-from glotouch_bt.mission.nodes import EMPTY, ConditionSettings, Position, Stack, Values, kind_of
+from glotouch_bt.mission.nodes import ConditionSettings, Position, Stack, Values, kind_of
 from glotouch_bt.mission.spec import NodeSpec
 
 MAX_STATES = 30_000
@@ -155,7 +155,7 @@ class _ShortestPath:
         value = self.followed(values, requirement.variable)
         if value is not None:
             return {value}
-        return set(self._flow.sets.values(self._flow.looked.get(requirement, EMPTY), requirement.variable))
+        return set(self._flow.values(requirement))
 
     def followed(self, values: Values, variable: int) -> int | None:
         """Return the value of a variable; None if the search does not follow it."""

@@ -43,7 +43,7 @@ class DataFlow:
     Attributes:
         entered: Ids of the nodes that are entered in some state.
         ends: (node id, True: in success) of the nodes that may end so.
-        looked: Set in which each requirement was looked at.
+        looked: Sets in which each requirement was looked at.
         facts: Results cached by node kinds, by node id; they do not depend on the entry state.
         end: Exit states of the root.
     """
@@ -64,7 +64,8 @@ class DataFlow:
         self.has_unknown = any(kind_of(n).is_unknown(n) for n in tree.walk())
         self.entered: set[int] = set()
         self.ends: set[tuple[int, bool]] = set()
-        self.looked: dict[Requirement, int] = {}
+        self.looked: dict[Requirement, set[int]] = {}
+        self._preemptible = {id(b) for n in tree.walk() if kind_of(n).preempts for b in n.walk()}
         self.facts: dict[int, Any] = {}
         self._known: dict[tuple[int, int], ExitStates] = {}
         self.end = self.run(tree, self.sets.start)
@@ -101,20 +102,35 @@ class DataFlow:
 
     def judged(self, requirement: Requirement) -> int:
         """Return the set in which a requirement was looked at, without the states that follow an unknown node."""
-        looked = self.looked.get(requirement, EMPTY)
+        looked = self.sets.union(*self.looked.get(requirement, ()))
         return self.sets.where(looked, self.variables.lost, (0,)) if self.has_unknown else looked
+
+    def values(self, requirement: Requirement) -> frozenset[int]:
+        """Return the values of a requirement's variable where it is looked at, also after an unknown node."""
+        looked = self.looked.get(requirement, ())
+        return frozenset().union(*(self.sets.values(one, requirement.variable) for one in looked))
 
     def found(self, requirement: Requirement) -> frozenset[int]:
         """Return the values that a requirement's variable may have where it is looked at."""
+        if requirement not in self.looked:
+            return frozenset()
         if self._coarse is not None and not self.sets.follows(requirement.variable):
             return self._coarse.found(requirement)
+        if not self.has_unknown:
+            return self.values(requirement)
         return self.sets.values(self.judged(requirement), requirement.variable)
 
     def note(self, requirements: Sequence[Requirement], entry: int) -> None:
         """Note that requirements are looked at in these states; they are always looked at together."""
         if requirements:
-            looked = self.sets.union(self.looked.get(requirements[0], EMPTY), entry)
-            self.looked.update(dict.fromkeys(requirements, looked))
+            if requirements[0] not in self.looked:
+                together: set[int] = set()
+                self.looked.update((requirement, together) for requirement in requirements)
+            self.looked[requirements[0]].add(entry)
+
+    def preemptible(self, node: NodeSpec) -> bool:
+        """Return True if a node above may preempt this one; otherwise nobody asks for its state while it runs."""
+        return id(node) in self._preemptible
 
     def look(self, node: NodeSpec, port: str, entry: int) -> Requirement | None:
         """Note that the node reads a port (or resource) in these states; returns the requirement."""

@@ -12,8 +12,8 @@ from glotouch_bt.mission.spec import NodeSpec
 
 def deciding(flow: DataFlow) -> Iterator[int]:
     """Yield the variables whose value decides whether a run goes on, or how a comparison ends."""
-    for requirement, looked in flow.looked.items():
-        found = flow.sets.values(looked, requirement.variable)
+    for requirement in flow.looked:
+        found = flow.values(requirement)
         if len(found) > 1 and _decides(flow, requirement, found):
             yield requirement.variable
 

@@ -120,11 +120,10 @@ class _Rules:
     # -- keys and resources ------------------------------------------------------------------------------------------
 
     def _requirement(self, requirement: Requirement) -> None:
-        flow = self._exact if self._exact.looked.get(requirement, EMPTY) != EMPTY else self._lenient
-        looked = flow.judged(requirement)
-        if looked == EMPTY:
-            return
+        flow = self._exact if requirement in self._exact.looked else self._lenient
         found = flow.found(requirement)
+        if not found:
+            return
         if requirement.unset == "not always":  # a key that only an earlier mistake leaves unwritten is no mistake here
             found |= self._lenient.found(requirement) - {ANYTHING}
         wrong = found - requirement.good - {UNSET}
@@ -137,7 +136,7 @@ class _Rules:
         if optional and not self._exact.has_unknown and not self._writers.get(requirement.key):
             self._unwritten.setdefault(requirement.key.rpartition("/")[2], []).append(requirement)
         if self._never_written(requirement, found):
-            self._unset(flow, requirement, looked)
+            self._unset(flow, requirement)
         elif UNSET in found and UNSET not in requirement.good:
             by = ", ".join(f"{n.name!r} (line {p.line})" for n, p in self._places(requirement))
             what = f"{_reader(requirement)}, which is written only on some paths to it, by {by}"
@@ -171,7 +170,7 @@ class _Rules:
         found = {n.name: (n, p) for n, p, _ in self._writers.get(requirement.key, [])}
         return sorted(found.values(), key=lambda w: (w[0] is requirement.node, w[1]))
 
-    def _unset(self, flow: DataFlow, requirement: Requirement, looked: int) -> None:
+    def _unset(self, flow: DataFlow, requirement: Requirement) -> None:
         what = f"{_reader(requirement)}, which no node writes before it"
         name = requirement.key.rpartition("/")[2]
         inside = {k.partition("@")[0] for k in self._writers if k != requirement.key and k.rpartition("/")[2] == name}
@@ -182,7 +181,7 @@ class _Rules:
             what += f"; {later[0][0].name!r} at line {later[0][1].line} writes it, but later or elsewhere"
         elif able := _skills_that_write(name, self._skills, requirement.node.skill):
             what += f"; skills that write it: {', '.join(able)}"
-        prefix = requirement.key.rpartition("/")[0]
+        prefix, looked = requirement.key.rpartition("/")[0], flow.judged(requirement)
         written = sorted(
             key
             for key, variable in self._variables.keys.items()

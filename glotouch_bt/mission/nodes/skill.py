@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import product
 from typing import Any, Literal
 
 from py_trees.behaviour import Behaviour
 
 from glotouch_bt.mission.nodes.base import (
+    EMPTY,
     BtcppForm,
     BuildContext,
     DataFlowAnalysis,
@@ -44,38 +44,33 @@ def written_kind(node: NodeSpec, port: str, result: str) -> ValueKind:
     return ValueKind(node.skill_type.OUTPUT_PORTS[port].data_type, element, unit_of_name(port), value)
 
 
-@dataclass(frozen=True)
-class _Change:
-    """Effect of a skill on one variable.
-
-    Attributes:
-        variable: The variable.
-        success: Its value after success; None: as before.
-        failure: Its possible values after a failure.
-        may_stay: After a failure it may be as before, too.
-        running: Its possible values when the skill is preempted, besides the one before.
-    """
-
-    variable: int
-    success: int | None
-    failure: tuple[int, ...]
-    may_stay: bool
-    running: tuple[int, ...]
+Change = tuple[int, tuple[int, ...], bool]
+"""A variable, its possible values afterwards, and whether it may be as before, too."""
 
 
-def _changes(node: NodeSpec, variables: StateVariables) -> Iterator[_Change]:
+def _changes(node: NodeSpec, variables: StateVariables) -> tuple[list[Change], list[Change], list[Change]]:
+    """Return what a skill changes in success, in failure, and until it is preempted."""
     skill = _skill_of(node)
+    success: list[Change] = []
+    failure: list[Change] = []
+    running: list[Change] = []
     for port, wire in node.writes.items():
+        key = variables.keys[wire.key]
         good, bad, part = (variables.value(wire.key, written_kind(node, port, result)) for result in RESULTS)
-        yield _Change(variables.keys[wire.key], good, (bad,), not _always_writes(skill, port), (part,))
-    for resource in variables.resources:
+        success.append((key, (good,), False))
+        failure.append((key, (bad,), not _always_writes(skill, port)))
+        running.append((key, (part,), True))
+    for resource, variable in variables.resources.items():
         leaves = skill.POSTCONDITIONS.get(resource)
         after = skill.FAILURE_STATES.get(resource, frozenset({UNCHANGED, leaves or UNCHANGED}))
         failed = tuple(variables.state(resource, s) for s in after - {UNCHANGED})
-        value = None if leaves is None else variables.state(resource, leaves)
-        if after != {UNCHANGED} or value is not None:
-            running = failed if value is None else (*failed, value)
-            yield _Change(variables.resources[resource], value, failed, UNCHANGED in after, running)
+        left = () if leaves is None else (variables.state(resource, leaves),)
+        if left:
+            success.append((variable, left, False))
+        if failed or left:
+            failure.append((variable, failed, UNCHANGED in after))
+            running.append((variable, (*failed, *left), True))
+    return success, failure, running
 
 
 class SkillKind(NodeKind):
@@ -127,21 +122,13 @@ class SkillKind(NodeKind):
         sets, requirements = flow.sets, flow.requirements[id(node)]
         if id(node) not in flow.facts:  # a variable that is not followed changes nothing
             needs = [r for r in requirements if sets.follows(r.variable)]
-            flow.facts[id(node)] = needs, [c for c in _changes(node, flow.variables) if sets.follows(c.variable)]
-        needs, changes = flow.facts[id(node)]
+            flow.facts[id(node)] = needs, *(sets.changes(c) for c in _changes(node, flow.variables))
+        needs, success, failure, running = flow.facts[id(node)]
         flow.note(requirements, entry)
         for requirement in needs:
             entry = flow.meeting(entry, requirement)
-        success = failure = running = entry
-        for change in changes:
-            if change.success is not None:
-                success = sets.assign(success, change.variable, change.success)
-            if change.may_stay:
-                failure = sets.allow(failure, change.variable, change.failure)
-            else:
-                failure = sets.union(*(sets.assign(failure, change.variable, v) for v in change.failure))
-            running = sets.allow(running, change.variable, change.running)
-        return ExitStates(success, failure, running)
+        during = sets.write(entry, running) if flow.preemptible(node) else EMPTY
+        return ExitStates(sets.write(entry, success), sets.write(entry, failure), during)
 
     def step(
         self, search: PathSearch, node: NodeSpec, stack: Stack, values: Values, memory: Any

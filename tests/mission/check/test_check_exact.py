@@ -295,10 +295,10 @@ def by_sets(spec: NodeSpec) -> tuple[DataFlow, set[tuple[str, str, str]], set[tu
     variables = variables_of(spec)
     flow = DataFlow(spec, variables, all_requirements(spec, variables))
     wrong: set[tuple[str, str, str]] = set()
-    for requirement, looked in flow.looked.items():
+    for requirement in flow.looked:
         if not requirement.stops:
             continue
-        for value in flow.sets.values(looked, requirement.variable) - requirement.good:
+        for value in flow.values(requirement) - requirement.good:
             state = variables.state_names("hand")[value] if requirement.of_resource else "unset"
             wrong.add((requirement.node.name, requirement.port, state))
     ends = set()
@@ -347,8 +347,8 @@ def test_the_path_shown_is_the_shortest_there_is(tree: Any) -> None:
     flow, _, _ = by_sets(spec)
     variables = flow.variables
     loops = any(n.kind == "for_each" for n in spec.walk())
-    for requirement, looked in flow.looked.items():
-        for value in flow.sets.values(looked, requirement.variable) - requirement.good if requirement.stops else ():
+    for requirement in flow.looked:
+        for value in flow.values(requirement) - requirement.good if requirement.stops else ():
             path = shortest_path(
                 flow, Goal(requirement.node, requirement.port, requirement.variable, frozenset({value}))
             )

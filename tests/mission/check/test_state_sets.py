@@ -20,7 +20,7 @@ def holds(algebra: StateSets, given: int, state: tuple[int, ...]) -> bool:
 @settings(max_examples=examples(80, 200), deadline=None)
 @given(
     sizes=st.lists(st.integers(2, 3), min_size=1, max_size=4),
-    steps=st.lists(st.tuples(st.integers(0, 4), st.integers(0, 3), st.integers(0, 7), st.integers(0, 9)), max_size=12),
+    steps=st.lists(st.tuples(st.integers(0, 5), st.integers(0, 3), st.integers(0, 7), st.integers(0, 9)), max_size=12),
 )
 def test_diagrams_are_sets(sizes: list[int], steps: list[tuple[int, int, int, int]]) -> None:
     """Every operation of `StateSets` against plain sets of tuples."""
@@ -36,6 +36,13 @@ def test_diagrams_are_sets(sizes: list[int], steps: list[tuple[int, int, int, in
             made, want = algebra.meet(a, b), plain & other
         elif operation == 2:
             made, want = algebra.where(a, variable, values), {c for c in plain if c[variable] in values}
+        elif operation == 5:
+            also, keep = which % len(sizes), which > 4
+            changes = [(variable, values, keep), *([(also, (0, 1), True)] if also != variable else [])]
+            made = algebra.write(a, algebra.changes(changes))
+            want = {(*c[:variable], v, *c[variable + 1 :]) for c in plain for v in values} | (plain if keep else set())
+            if also != variable:
+                want |= {(*c[:also], v, *c[also + 1 :]) for c in want for v in (0, 1)}
         else:
             want = {(*c[:variable], v, *c[variable + 1 :]) for c in plain for v in values}
             made = algebra.allow(a, variable, values)

@@ -65,7 +65,7 @@ class LoopKind(NodeKind):
         ends = {True: union(*(p.success for p in passes)), False: union(*(p.failure for p in passes))}
         result = self.exhausted(node)
         ends[result] = union(ends[result], last.again)
-        between = [p.again for p in passes[: limit - 1]]
+        between = [p.again for p in passes[: limit - 1]] if flow.preemptible(node) else []
         return ExitStates(ends[True], ends[False], union(*between, *(p.running for p in passes)))
 
     def memory(self, values: Values) -> Any:

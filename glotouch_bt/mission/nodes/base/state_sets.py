@@ -44,7 +44,9 @@ class StateSets:
         self._unions: dict[tuple[int, int], int] = {}
         self._meets: dict[tuple[int, int], int] = {}
         self._parts: dict[tuple[int, int, int], int] = {}
-        self._written: dict[tuple[int, int, int, bool], int] = {}
+        self._changes: list[tuple[int, int, bool, int]] = [(-1, 0, False, 0)]
+        self._change_ids: dict[tuple[int, int, bool, int], int] = {}
+        self._written: dict[tuple[int, int], int] = {}
 
     def _node(self, variable: int, children: tuple[int, ...]) -> int:
         if not any(children[1:]):
@@ -125,33 +127,63 @@ class StateSets:
 
     def assign(self, given: int, variable: int, value: int) -> int:
         """Return all states, with a variable set to a value."""
-        return given if variable in self._ignored else self._write(given, variable, 1 << value, keep=False)
+        return self.write(given, self.changes([(variable, (value,), False)]))
 
     def allow(self, given: int, variable: int, values: Iterable[int]) -> int:
         """Return all states as they are, and with a variable set to any of some values."""
-        return given if variable in self._ignored else self._write(given, variable, _bits(values), keep=True)
+        return self.write(given, self.changes([(variable, values, True)]))
+
+    def changes(self, wanted: Iterable[tuple[int, Iterable[int], bool]]) -> int:
+        """Return the number of some changes, for `write`.
+
+        Args:
+            wanted: Variable, its possible values afterwards, and whether it may keep its value. What changes twice has
+                one of the values of both.
+        """
+        merged: dict[int, tuple[int, bool]] = {}
+        for variable, values, keep in wanted:
+            bits, both = merged.get(variable, (0, True))
+            merged[variable] = (bits | _bits(values), both and keep)
+        made = 0  # the changes of variables that are tested later; equal rests have one number
+        for variable in sorted(merged):
+            if variable not in self._ignored:
+                change = (variable, *merged[variable], made)
+                made = self._change_ids.setdefault(change, len(self._changes))
+                if made == len(self._changes):
+                    self._changes.append(change)
+        return made
 
     def follows(self, variable: int) -> bool:
         """Return True if a variable is followed."""
         return variable not in self._ignored
 
-    def _write(self, given: int, variable: int, bits: int, keep: bool) -> int:
-        """Set a variable to each value in `bits`; with `keep`, keep the states as they are as well."""
-        held = self._values(given, variable)
-        if held == 0 or held == bits == bits & -bits:  # no state, or all have that value
+    def write(self, given: int, changes: int) -> int:
+        """Return all states after changes of some variables (`changes`)."""
+        variable = bits = rest = 0
+        keep = False
+        while changes:
+            variable, bits, keep, rest = self._changes[changes]
+            held = self._values(given, variable)
+            if held == 0:  # no state
+                return EMPTY
+            if held != bits or bits & bits - 1:
+                break
+            changes = rest  # all states have that value
+        if not changes:
             return given
-        key = (given, variable, bits, keep)
+        key = (given, changes)
         found = self._written.get(key)
         if found is None:
             at, children = self._nodes[given]
             if at > variable:
-                made = [self._write(c, variable, bits, keep) for c in children]
+                found = self._node(at, tuple([self.write(c, changes) for c in children]))
             else:
                 if at < variable:  # it is 0
                     children = (given,) + (EMPTY,) * (self._sizes[variable] - 1)
-                whole = self.union(*children)
-                made = [whole if bits >> v & 1 else c if keep else EMPTY for v, c in enumerate(children)]
-            found = self._written[key] = self._node(max(at, variable), tuple(made))
+                whole = self.write(self.union(*children), rest)
+                kept = [self.write(c, rest) for c in children] if keep else (EMPTY,) * len(children)
+                found = self._node(variable, tuple([whole if bits >> v & 1 else c for v, c in enumerate(kept)]))
+            self._written[key] = found
         return found
 
     def values(self, given: int, variable: int) -> frozenset[int]:

@@ -26,6 +26,7 @@ class ValueSets:
         self._sizes = tuple(sizes)
         self._first = [0, *accumulate(self._sizes)]  # bit of each variable's value 0
         self._all = [(1 << size) - 1 << bit for size, bit in zip(self._sizes, self._first, strict=False)]
+        self._changes: list[list[tuple[int, int, bool]]] = []
         self.start = sum(1 << bit for bit in self._first[:-1])
 
     def union(self, *sets: int) -> int:
@@ -52,6 +53,19 @@ class ValueSets:
     def allow(self, given: int, variable: int, values: Iterable[int]) -> int:
         """Return a set that contains all states as they are, and with a variable set to any of some values."""
         return given | self._bits(variable, values) if given else EMPTY
+
+    def changes(self, wanted: Iterable[tuple[int, Iterable[int], bool]]) -> int:
+        """Return the number of some changes, for `write`; see `StateSets`."""
+        self._changes.append([(self._all[v], self._bits(v, values), keep) for v, values, keep in wanted])
+        return len(self._changes) - 1
+
+    def write(self, given: int, changes: int) -> int:
+        """Return a set that contains all states after changes of some variables."""
+        for whole, bits, keep in self._changes[changes] if given else ():
+            given = given | bits if keep else given & ~whole | bits
+            if not given & whole:
+                return EMPTY
+        return given
 
     def follows(self, variable: int) -> bool:
         """Return True: all variables are followed."""
