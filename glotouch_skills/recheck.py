@@ -8,7 +8,6 @@ import numpy as np
 
 from glotouch_bt.motion import Motion, finger_outline_half_m
 from glotouch_bt.perception.touch import Candidate, GuardParams, signed_distance
-from glotouch_bt.perception.touch.detection import Polygon
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import MOTION_REFUSED, Failure, In, Skill, SkillParams, SkillRun, come_to_rest, param
 from glotouch_bt.skill.probing import HeldTool, Prober
@@ -93,7 +92,7 @@ class Recheck(Skill):
             self._require_tool(self.tool)
             yield from self._ready(held=True)
             found["floor_z_K_m"] = yield from self._floor(self.tool)
-            found["candidate"] = yield from self._touch_one(self.tool, self.tool.tip_radius_m)
+            found["candidate"] = yield from self._touch_one(self.tool, self.tool.tip_radius_m, self.tool.tip_radius_m)
         elif held_m is not None and context.observation.gripper.force_N > MIN_GRIP_N:
             found["object"] = True
         elif held_m is not None:
@@ -144,26 +143,20 @@ class Recheck(Skill):
             return None
         arm = self.context.arm
         state = yield from arm.jaws(0.0)
-        gripper = arm.description.gripper
-        half = finger_outline_half_m(gripper, state.aperture_m)
-        radius = float(np.hypot(*half))
-        fingers = HeldTool(
-            tip_P_m=np.array([gripper.finger.centre_m[0], 0.0, gripper.fingertip_below_P_m]),
-            tip_radius_m=radius,
-            shaft_radius_m=radius,
-            aperture_m=state.aperture_m,
-            yaw_B_rad=arm.pose_B_P.yaw_rad,
-            section=Polygon.rectangle(*half),
-        )
-        return (yield from self._touch_one(fingers, float(np.min(half))))
+        fingers = HeldTool.fingers(arm.description.gripper, state.aperture_m, arm.pose_B_P.yaw_rad)
+        half = finger_outline_half_m(arm.description.gripper, state.aperture_m)
+        return (yield from self._touch_one(fingers, float(np.min(half)), float(np.hypot(*half))))
 
-    def _touch_one(self, tool: HeldTool, min_m: float) -> Motion[int | None]:
+    def _touch_one(self, tool: HeldTool, min_m: float, max_m: float) -> Motion[int | None]:
         """Touch a candidate from its side; return its index, or None if none is known or reachable.
 
-        `min_m`: least distance from the tool's middle to its boundary.
+        Args:
+            tool: What touches.
+            min_m: Least distance from the tool's middle to its boundary.
+            max_m: Largest distance.
         """
         p = self.params
-        for candidate, start, goal in self._ways(tool, min_m):
+        for candidate, start, goal in self._ways(min_m, max_m):
             prober = Prober(self.context, tool, GuardParams())
             try:
                 yield from prober.hop(np.array([*start, 0.0]), tool.floor_z_K_m + p.headroom_m, p.speed_m_s)
@@ -192,11 +185,11 @@ class Recheck(Skill):
             f"candidate {candidate.index} is not where it was traced: {how}", candidate=candidate.index
         )
 
-    def _ways(self, tool: HeldTool, min_m: float) -> list[tuple[Candidate, Array, Array]]:
+    def _ways(self, min_m: float, max_m: float) -> list[tuple[Candidate, Array, Array]]:
         """Return (candidate, start, goal), the most free space first; places (2,) in K."""
         p = self.params
         known: tuple[Candidate, ...] = (self.candidates or ()) if p.touch else ()
-        half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - tool.tip_radius_m - CLEAR_M
+        half = 0.5 * np.array(self.context.world.container.interior_m[:2]) - max_m - CLEAR_M
         ways: list[tuple[float, int, Candidate, Array, Array]] = []
         for candidate in known:
             others = [c.contour for c in known if c is not candidate]
@@ -204,11 +197,11 @@ class Recheck(Skill):
                 angle = 2.0 * np.pi * i / DIRECTIONS
                 out = np.array([np.cos(angle), np.sin(angle)])
                 edge = candidate.contour.centre_K_m + out * _reach_m(candidate, out)
-                start = edge + out * (tool.tip_radius_m + BEFORE_M)
+                start = edge + out * (max_m + BEFORE_M)
                 if (np.abs(start) > half).any():
                     continue
                 free = min((float(signed_distance(c, start[None])[0]) for c in others), default=np.inf)
-                free = min(free - tool.tip_radius_m, float((half - np.abs(start)).min()) + CLEAR_M)
+                free = min(free - max_m, float((half - np.abs(start)).min()) + CLEAR_M)
                 if free >= CLEAR_M:
                     goal = edge + out * (min_m - BEYOND_M)
                     ways.append((-free, len(ways), candidate, start, goal))

@@ -89,7 +89,7 @@ def _true_container(world: World, conditions: Conditions, seed: int, proof: Axis
     return there @ rotation_vector(np.array([tilt[0], tilt[1], 0.0]))
 
 
-def _true_shaft(world: World, conditions: Conditions, rng: np.random.Generator) -> Pose:
+def _true_shaft(conditions: Conditions, rng: np.random.Generator) -> Pose:
     """Draw a tilt about the handle's centre and a shift across the shaft."""
     shift = conditions.tip_offset_sd_m * rng.standard_normal(2)
     tilt = np.deg2rad(conditions.tip_tilt_sd_deg) * rng.standard_normal(2)
@@ -214,7 +214,7 @@ def draw_truth(
         objects = [replace(o, place=p) for o, p in zip(objects, apart, strict=True)]
     return Truth(
         pose_B_K=_true_container(world, conditions, seed, proof),
-        pose_handle_shaft=_true_shaft(world, conditions, stream(seed, "probe")),
+        pose_handle_shaft=_true_shaft(conditions, stream(seed, "probe")),
         pad_friction=float(stream(seed, "pads").uniform(*conditions.pad_friction)),
         objects=tuple(objects),
         probe_stiffness_Nm_rad=_probe_stiffness(world, conditions, stream(seed, "probe compliance"), proof),

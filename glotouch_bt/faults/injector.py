@@ -48,7 +48,7 @@ class FaultInjector(Robot):
         self.pending_events: list[tuple[float, dict[str, object]]] = []
         self.outcome = ""
         self.held = False
-        self._scene = partial(
+        self._make_context = partial(
             EffectContext,
             period_s=robot.period_s,
             description=robot.description,
@@ -61,17 +61,17 @@ class FaultInjector(Robot):
         self._waiting: list[ScheduledFault] = []
         self._active: list[ScheduledFault] = []
         for spec in plan.faults:
-            self.arm(spec)
+            self.add_fault(spec)
 
-    def arm(self, spec: FaultSpec) -> None:
+    def add_fault(self, spec: FaultSpec) -> None:
         """Add a fault, waiting for its trigger from now on.
 
         Raises:
             BadInput: It is impossible here.
         """
-        scene = self._scene(stream(self._draws, f"fault {spec.name}"))
+        context = self._make_context(stream(self._draws, f"fault {spec.name}"))
         try:
-            effect = spec.kind.effect(spec.params, scene)
+            effect = spec.kind.effect(spec.params, context)
             effect.prepare()
         except BadInput as e:
             raise BadInput(f"{spec.place}: {spec.name}: {e}") from e

@@ -90,7 +90,7 @@ def launch(
             if resumable is None:
                 folder.check_free(request.overwrite)
             if plan is not None and resumable is None:
-                mission = _misled(mission, plan, request, folder.path / MODELS)
+                mission = _with_wrong_models(mission, plan, request, folder.path / MODELS)
             known = backend.describe(options)
             if known is not None:  # before a real arm is enabled
                 _require_suited(known, mission)
@@ -164,7 +164,7 @@ def _fault_plan(request: RunRequest, mission: Mission) -> FaultPlan | None:
     return given if isinstance(given, FaultPlan) else read_plan(given, mission.spec, mission.name)
 
 
-def _misled(mission: Mission, plan: FaultPlan, request: RunRequest, folder: Path) -> Mission:
+def _with_wrong_models(mission: Mission, plan: FaultPlan, request: RunRequest, folder: Path) -> Mission:
     """Return the mission with the wrong models of a fault plan, if it has any."""
     from glotouch_bt.faults import wrong_models
 

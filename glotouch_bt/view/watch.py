@@ -38,7 +38,7 @@ class RunWatch:
         folder: The run's folder; the record may not exist yet.
         controls: Requests to the mission, if it is this program's own.
         objects: Folder of STL files for the true objects, instead of the shipped ones.
-        told: Its `truth`, once there is one, is the list of true objects at the start of a run under way.
+        from_run: Its `truth`, once there is one, is the list of true objects at the start of a run under way.
 
     Attributes:
         page: The page.
@@ -53,10 +53,10 @@ class RunWatch:
         folder: Path,
         controls: MissionControls | None = None,
         objects: Path | None = None,
-        told: Mapping[str, Any] | None = None,
+        from_run: Mapping[str, Any] | None = None,
     ) -> None:
         self._server, self._folder, self._objects = server, folder, objects
-        self._told = told or {}
+        self._from_run = from_run or {}
         self.player = Player(live=True)
         self.page = Page(server, self.player, controls)
         self._model = RunModel()
@@ -124,11 +124,11 @@ class RunWatch:
         try:
             stamp = path.stat().st_mtime
         except OSError:
-            stamp = 0.0 if "truth" in self._told else -1.0
+            stamp = 0.0 if "truth" in self._from_run else -1.0
         if stamp == self._truth_stamp:
             return
         self._truth_stamp = stamp
-        truth = read_json(path) if stamp > 0.0 else {"start": self._told.get("truth")}
+        truth = read_json(path) if stamp > 0.0 else {"start": self._from_run.get("truth")}
         found: dict[str, tuple[GhostObject, ...]] = {}
         for word, key in ((AT_START, "start"), (AT_END, "end")):
             bodies = tuple(true_bodies(truth.get(key))) if isinstance(truth, dict) else ()

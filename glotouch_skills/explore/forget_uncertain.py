@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations
 
 from glotouch_bt.perception.recognition import ProbeTouch
-from glotouch_bt.perception.search import OVERLAP_M, SearchMap, overlap_depth_m
+from glotouch_bt.perception.search import SearchMap, contradictions
 from glotouch_bt.perception.touch import Candidate
-from glotouch_bt.perception.touch.outline import KNOWN_QUALITY
 from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 
@@ -33,8 +31,8 @@ class ForgetUncertain(Skill):
     contacts do not mend it. The search goes back to where it was touched, and traces it with new contacts only. It goes
     on, too, if fewer candidates are left than objects are expected: two of them turned out to be one body.
 
-    SUCCESS: `candidates` and `map` have no such outline. `certain` is true if there was none and no object is missing,
-    or if the search went on often enough.
+    SUCCESS: `candidates` and `map` have no such outline. `search_done` is true if there was none and no object is
+    missing, or if the search went on often enough.
     """
 
     Params = ForgetUncertainParams
@@ -49,7 +47,7 @@ class ForgetUncertain(Skill):
     map = Out(SearchMap, "where to search now")
     candidates = Out(tuple, "the other candidates", element=Candidate)
     probed = Out(tuple, "measurements of the other candidates", element=ProbeTouch)
-    certain = Out(bool, "the search need not go on")
+    search_done = Out(bool, "the search need not go on")
     retraced = Out(tuple, "why the search went on so far, as in the report", element=tuple)
 
     def run(self) -> SkillRun:
@@ -59,13 +57,13 @@ class ForgetUncertain(Skill):
             raise self.NOTHING_SEARCHED("there is no map yet")
         known, probed, rows = self.known or (), self.before_probed or (), self.before_retraced or ()
         refined = {t.candidate for t in probed if t.part == "outline"}
-        wrong = _wrong(tuple(c for c in known if c.index in refined))
+        wrong = contradictions([c for c in known if c.index in refined])
         belief = self.before.only_with(known)
         missing = belief.expected is not None and belief.found < belief.expected
         times = len({row[0] for row in rows})
-        self.certain = not (wrong or missing) or times >= self.params.times
+        self.search_done = not (wrong or missing) or times >= self.params.times
         self.map, self.candidates, self.probed, self.retraced = belief, known, probed, rows
-        if self.certain:
+        if self.search_done:
             return
         gone = tuple(c for c in known if c.index in wrong)
         self.candidates = tuple(c for c in known if c.index not in wrong)
@@ -87,13 +85,3 @@ class ForgetUncertain(Skill):
             ("round", "forgotten candidate", "why"),
             self.retraced,
         )
-
-
-def _wrong(candidates: tuple[Candidate, ...]) -> dict[int, str]:
-    """Return the candidates whose outline cannot be right, and why: the less certain one of two that overlap."""
-    wrong = {c.index: "its outline is still uncertain" for c in candidates if c.quality < KNOWN_QUALITY}
-    for one, other in combinations((c for c in candidates if c.index not in wrong), 2):
-        if overlap_depth_m(one.contour, other.contour) > OVERLAP_M:
-            worse, better = sorted((one, other), key=lambda c: c.quality)
-            wrong.setdefault(worse.index, f"its outline overlaps that of candidate {better.index}")
-    return wrong

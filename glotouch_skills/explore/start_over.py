@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from glotouch_bt.perception.search import OVERLAP_M, SearchMap, overlap_depth_m
+from glotouch_bt.perception.search import SearchMap, contradictions
 from glotouch_bt.perception.touch import Candidate, TouchSet
-from glotouch_bt.perception.touch.outline import KNOWN_QUALITY
 from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 
@@ -54,7 +52,8 @@ class StartOver(Skill):
         """See the class."""
         yield HOLD
         candidates: tuple[Candidate, ...] = self.known or ()
-        why = _contradiction(candidates)
+        wrong = contradictions(candidates)
+        why = "; ".join(f"candidate {index}: {what}" for index, what in wrong.items())
         times = self.times_before or 0
         if self.before is None or not why or times >= self.params.times:
             raise self.CONSISTENT(why or "the outlines do not overlap and are known", times=times)
@@ -71,15 +70,3 @@ class StartOver(Skill):
             ("forgotten candidates", "why"),
             ((", ".join(map(str, indices)), why),),
         )
-
-
-def _contradiction(candidates: tuple[Candidate, ...]) -> str:
-    """Return why not all candidates can be right; empty if they can."""
-    for one, other in combinations(candidates, 2):
-        depth_m = overlap_depth_m(one.contour, other.contour)
-        if depth_m > OVERLAP_M:
-            return f"the outlines of candidates {one.index} and {other.index} overlap by {1e3 * depth_m:.0f} mm"
-    for candidate in candidates:
-        if candidate.quality < KNOWN_QUALITY:
-            return f"the outline of candidate {candidate.index} is uncertain"
-    return ""

@@ -79,7 +79,7 @@ class Nudge(Skill):
     topple it ends. The space is made for the first object of `cramped`; the pushed object may be a neighbour of it.
     With a stated distance, that object itself is pushed.
 
-    SUCCESS: it was pushed all the way; `candidates` has its new position, and its touches are given up.
+    SUCCESS: it was pushed all the way; `candidates` has its new position, and its touches are discarded.
     """
 
     Params = NudgeParams

@@ -69,7 +69,7 @@ class SetDown(Skill):
     The hand must still be above where it took the object. The jaws have centred the object between them, and it moves
     with the hand. So its outline, moved and turned, is known afterwards.
 
-    SUCCESS: the jaws are open and high; `candidates` has the object where it stands now, and its touches are given up.
+    SUCCESS: the jaws are open and high; `candidates` has the object where it stands now, and its touches are discarded.
     """
 
     Params = SetDownParams

@@ -13,7 +13,7 @@ from glotouch_skills.common.planning import GraspPlan
 class RejectParams(SkillParams):
     """Parameters of `reject`."""
 
-    most: int = param("Largest number of objects taken in vain", default=2, ge=0, le=20)
+    max_rejected: int = param("Largest number of objects taken in vain", default=2, ge=0, le=20)
 
 
 class Reject(Skill):
@@ -56,9 +56,9 @@ class Reject(Skill):
         self.doubted, self.rejected = doubted, rejected
         self.touchsets = tuple(t for t in self.felt if t.candidate.index != index)
         self.event("reject", candidate=index, rejected=rejected)
-        if len(doubted) > self.params.most:
+        if len(doubted) > self.params.max_rejected:
             raise self.WRONG_OBJECT(
                 f"{len(doubted)} objects were taken and put back; candidate {index} was the last",
                 taken=len(doubted),
-                most=self.params.most,
+                max_rejected=self.params.max_rejected,
             )

@@ -13,6 +13,7 @@ from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.skill import UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import (
     CLEARANCE_M,
+    MIN_GRIP_M,
     NoSpace,
     close_compliantly,
     descend,
@@ -36,7 +37,7 @@ class GraspParams(SkillParams):
         "Height of the fingertips above the floor on the way", unit="m", default=0.15, ge=0.05, le=0.25
     )
     side_gap_m: float = param("Least gap between open jaw and object", unit="m", default=0.005, ge=0.001, le=0.03)
-    min_aperture_m: float = param("Minimum aperture of jaws that hold something", unit="m", default=0.003, ge=0.0)
+    min_aperture_m: float = param("Minimum aperture of jaws that hold something", unit="m", default=MIN_GRIP_M, ge=0.0)
 
 
 class Grasp(Skill):

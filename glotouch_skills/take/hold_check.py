@@ -11,7 +11,7 @@ from glotouch_skills.common.hand import feel_hold
 class HoldCheckParams(SkillParams):
     """Parameters of `hold_check`."""
 
-    look_s: float = param("Time for which gels and jaws are measured", unit="s", default=0.2, ge=0.05, le=2.0)
+    measure_s: float = param("Time for which gels and jaws are measured", unit="s", default=0.2, ge=0.05, le=2.0)
     weight_kept: float = param("Least share of the weight measured at the lift", default=0.6, gt=0.0, le=1.0)
     slip_m: float = param(
         "Largest change of the aperture since the jaws closed", unit="m", default=0.004, gt=0.0, le=0.02
@@ -48,11 +48,11 @@ class HoldCheck(Skill):
     def run(self) -> SkillRun:
         """See the class."""
         p = self.params
-        hold = yield from feel_hold(self.context.arm, self.grip_m, p.look_s)
+        hold = yield from feel_hold(self.context.arm, self.grip_m, p.measure_s)
         self.event("hold", **hold.as_dict())
-        doubts = hold.doubts(p.weight_kept * self.before_N, p.slip_m)
-        if len(doubts) >= 2:
-            raise self.LOST("; ".join(doubts), **hold.as_dict())
+        failed = hold.failed_checks(p.weight_kept * self.before_N, p.slip_m)
+        if len(failed) >= 2:
+            raise self.LOST("; ".join(failed), **hold.as_dict())
         if not abs(hold.moved_m) <= p.slip_m:
             raise self.SLIPPED(
                 f"the jaws moved by {hold.moved_m * 1e3:.1f} mm since they closed; {p.slip_m * 1e3:g} mm are allowed",

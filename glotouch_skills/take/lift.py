@@ -34,13 +34,13 @@ class LiftParams(SkillParams):
     slip_m: float = param(
         "Largest change of the aperture since the jaws closed", unit="m", default=0.004, gt=0.0, le=0.02
     )
-    look_s: float = param("Time for which gels and jaws are measured", unit="s", default=0.2, ge=0.05, le=2.0)
+    measure_s: float = param("Time for which gels and jaws are measured", unit="s", default=0.2, ge=0.05, le=2.0)
 
 
 class Lift(Skill):
     """Raise the hand under a force limit and check the hold at the top: by weight, jaws (aperture and force), and gels.
 
-    No single witness is believed: a wrist may be off zero, and jaws may report what they were told. All must agree.
+    All three measurements must agree: a wrist may be off zero, and jaws may report their target.
     Jaws that closed farther, with the object on both gels, hold one that turned between them: `grip_m` is written anew.
     An object that holds the hand back is lowered again and let go.
 
@@ -51,7 +51,7 @@ class Lift(Skill):
     params: LiftParams
 
     PRECONDITIONS: ClassVar = {"hand": frozenset({"object"}), "wrist": frozenset({"tared"})}
-    # `lost` if any witness says so: the object may still be between the pads.
+    # `lost` if any check fails: the object may still be between the pads.
     FAILURE_STATES: ClassVar = {"hand": frozenset({"object", "empty"})}
     USES: ClassVar = frozenset({"arm"})
 
@@ -86,11 +86,11 @@ class Lift(Skill):
         low_m, start_m = float(arm.pose_B_P.position_m[2]), min(START_M, p.height_m)
         for way_m, speed_m_s in ((start_m, START_M_S), (p.height_m - start_m, p.speed_m_s)):
             yield from self._rise(way_m, speed_m_s, low_m)
-        hold = yield from feel_hold(arm, self.grip_m, p.look_s)
+        hold = yield from feel_hold(arm, self.grip_m, p.measure_s)
         self.event("lift", **hold.as_dict())
-        doubts = hold.doubts(p.min_weight_N, p.slip_m, p.min_aperture_m, may_turn=True)
-        if doubts:
-            raise self.LOST("; ".join(doubts), **hold.as_dict())
+        failed = hold.failed_checks(p.min_weight_N, p.slip_m, p.min_aperture_m, may_turn=True)
+        if failed:
+            raise self.LOST("; ".join(failed), **hold.as_dict())
         self.held_m, self.weight_N = hold.aperture_m, hold.weight_N
 
     def _rise(self, way_m: float, speed_m_s: float, low_m: float) -> Motion[None]:

@@ -11,6 +11,7 @@ from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import Pose
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Skill, SkillParams, SkillRun, param
 from glotouch_skills.common.hand import (
+    MIN_GRIP_M,
     MIN_GRIP_N,
     RELEASE_HEIGHT_M,
     keeping_clear_of,
@@ -37,7 +38,7 @@ class PutBackParams(SkillParams):
     lower_speed_m_s: float = param("Speed of setting down", unit="m/s", default=0.008, gt=0.0, le=0.04)
     drop_m: float = param("Largest height above its place at which it may be released", unit="m", default=0.015, ge=0.0,
                           le=0.05)  # fmt: skip
-    min_aperture_m: float = param("Minimum aperture of jaws that hold something", unit="m", default=0.003, ge=0.0)
+    min_aperture_m: float = param("Minimum aperture of jaws that hold something", unit="m", default=MIN_GRIP_M, ge=0.0)
 
 
 class PutBack(Skill):

@@ -7,7 +7,6 @@ from typing import ClassVar
 import numpy as np
 
 from glotouch_bt.motion import finger_outline_half_m, yaw_near_home
-from glotouch_bt.perception.touch.detection import Polygon
 from glotouch_bt.robot import Pose
 from glotouch_bt.skill import MOTION_REFUSED, Failure, Out, Skill, SkillParams, SkillRun, param
 from glotouch_bt.skill.probing import HeldTool
@@ -60,14 +59,6 @@ class BareHand(Skill):
         over = container.apply(np.array([*corner_place(world, corners(world)[0], self.params.corner_gap_m), 0.0]))
         yield from arm.line(Pose.pointing_down((*over[:2], here.position_m[2]), yaw), TRAVEL_M_S)
         yield from set_payload_and_tare(self.context)
-        gripper = arm.description.gripper
-        half = finger_outline_half_m(gripper, state.aperture_m)
-        self.tool = HeldTool(
-            tip_P_m=np.array([gripper.finger.centre_m[0], 0.0, gripper.fingertip_below_P_m]),
-            tip_radius_m=float(np.sqrt(4.0 * half[0] * half[1] / np.pi)),
-            shaft_radius_m=float(np.sqrt(4.0 * half[0] * half[1] / np.pi)),
-            aperture_m=state.aperture_m,
-            yaw_B_rad=yaw,
-            section=Polygon.rectangle(*half),
-        )
+        self.tool = HeldTool.fingers(arm.description.gripper, state.aperture_m, yaw)
+        half = finger_outline_half_m(arm.description.gripper, state.aperture_m)
         self.event("tool", held=True, section_half_m=half)

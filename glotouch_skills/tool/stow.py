@@ -7,13 +7,17 @@ from typing import ClassVar
 from glotouch_bt.motion import Motion
 from glotouch_bt.robot import Probe
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import GRAVITY_M_S2, RISE_M_S, WRIST_STATES, rise_clear, set_payload_and_tare, weigh_N
+from glotouch_skills.common.hand import (
+    GRAVITY_M_S2,
+    MIN_GRIP_M,
+    MIN_GRIP_N,
+    RISE_M_S,
+    WRIST_STATES,
+    rise_clear,
+    set_payload_and_tare,
+    weigh_N,
+)
 from glotouch_skills.common.probe import HELD_TOLERANCE_M, RETURN_PROBE_FAILURES, return_probe
-
-MIN_HELD_M = 0.003
-"""The jaws hold something if the aperture is larger than this ..."""
-MIN_HELD_N = 1.0
-"""... and the jaw force larger than this."""
 
 
 class StowParams(SkillParams):
@@ -66,7 +70,7 @@ class Stow(Skill):
             )
             self.event("tool", held=False)
             return
-        if not arm.scene.holding_tool and apart > MIN_HELD_M and pressed > MIN_HELD_N:
+        if not arm.scene.holding_tool and apart > MIN_GRIP_M and pressed > MIN_GRIP_N:
             raise self.OBJECT_HELD(
                 f"the jaws are {apart * 1e3:.1f} mm apart and press with {pressed:.0f} N: they keep what they hold",
                 aperture_m=apart,

@@ -26,7 +26,14 @@ from glotouch_skills.common.hand import (
     straight_guard,
     weigh_N,
 )
-from glotouch_skills.common.probe import FEEL_FLOOR_FAILURES, FLOOR_SEARCH_M, corner_walls, corners, feel_floor
+from glotouch_skills.common.probe import (
+    FEEL_FLOOR_FAILURES,
+    FLOOR_SEARCH_M,
+    HELD_TOLERANCE_M,
+    corner_walls,
+    corners,
+    feel_floor,
+)
 
 MAX_APPROACH_FORCE_N = 8.0
 """Change of force that stops the open hand above the handle; without an obstacle it stays below 2 N."""
@@ -54,8 +61,6 @@ GIVE_WAY_M_S = 0.01
 """Speed of giving way. Source: ours."""
 HORIZONTAL_B = np.array([1.0, 1.0, 0.0])
 """Selects the horizontal components in B."""
-HANDLE_TOLERANCE_M = 0.004
-"""The jaws hold the handle if the aperture is within this of its width: twice the largest bias, and compliance."""
 MIN_OPEN_M = 0.01
 """The jaws are opened at least this much wider than the handle before they go down over it. Source: ours."""
 
@@ -158,7 +163,6 @@ class ToolPickup(Skill):
         tool = HeldTool(
             tip_P_m=np.array([0.0, 0.0, probe.grasp_to_tip_m]),
             tip_radius_m=probe.tip_radius_m,
-            shaft_radius_m=0.5 * probe.shaft_diameter_m,
             aperture_m=aperture,
             yaw_B_rad=yaw,
         )
@@ -198,7 +202,7 @@ class ToolPickup(Skill):
 
     def _handle_wide(self, aperture_m: float) -> bool:
         """Return True if the aperture is the handle's width."""
-        return abs(aperture_m - self.context.world.probe.handle_m[1]) <= HANDLE_TOLERANCE_M
+        return abs(aperture_m - self.context.world.probe.handle_m[1]) <= HELD_TOLERANCE_M
 
     def _grip(self, yaw_B_rad: float) -> Motion[float]:
         """Descend over the stowed probe with open jaws, close on its handle, and return the aperture."""

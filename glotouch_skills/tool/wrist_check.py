@@ -19,7 +19,7 @@ class WristCheckParams(SkillParams):
 
     force_N: float = param("Largest force in free air", unit="N", default=0.5, gt=0.0, le=10.0)
     torque_Nm: float = param("Largest torque about the sensor in free air", unit="Nm", default=0.10, gt=0.0, le=3.0)
-    look_s: float = param("Time over which the wrench is averaged", unit="s", default=0.15, ge=0.02, le=2.0)
+    measure_s: float = param("Time over which the wrench is averaged", unit="s", default=0.15, ge=0.02, le=2.0)
     speed_m_s: float = param("Speed of rising to free air", unit="m/s", default=RISE_M_S, gt=0.0, le=0.15)
 
 
@@ -50,7 +50,7 @@ class WristCheck(Skill):
         arm, p = self.context.arm, self.params
         yield from rise_clear(arm, p.speed_m_s)
         yield from arm.hold(STAND_S)
-        blocks = yield from arm.hold(p.look_s)
+        blocks = yield from arm.hold(p.measure_s)
         mean = np.concatenate([b.wrench_S for b in blocks]).mean(axis=0)
         force, torque = float(np.linalg.norm(mean[:3])), float(np.linalg.norm(mean[3:]))
         if not (force <= p.force_N and torque <= p.torque_Nm):  # false for NaN, too

@@ -106,7 +106,7 @@ def test_what_does_not_fit_is_put_back_and_the_next_one_is_taken(retrieve: Run, 
     stage = ["match", "put_back", "wrist_check 10", "grasp", "lift", "hold_check", "object_check"]
     assert [c.node for c in run.calls_of(TAKE)] == [*stage, "put_back 3", "reject", *stage]
     assert run.calls_of("match")[1].inputs["rejected"] == (4,)
-    assert run.calls_of("reject")[0].params.most == 2
+    assert run.calls_of("reject")[0].params.max_rejected == 2
 
 
 def test_what_has_been_taken_in_vain_often_enough_ends_it(retrieve: Run) -> None:

@@ -37,8 +37,8 @@ def forgets(times: int) -> Any:
         known: tuple[Candidate, ...] = call.inputs["known"]
         probed = call.inputs["before_probed"]
         if len(calls) > times:
-            return ok(certain=True, candidates=known, probed=probed)
-        return ok(certain=False, candidates=(), probed=())
+            return ok(search_done=True, candidates=known, probed=probed)
+        return ok(search_done=False, candidates=(), probed=())
 
     return answer
 

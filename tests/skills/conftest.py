@@ -297,7 +297,7 @@ def tool(world: World) -> HeldTool:
     probe = world.probe
     home_yaw = forward(RIZON4_XENSE, np.array(RIZON4_XENSE.home_q)).yaw_rad
     tip = np.array([0.0, 0.0, probe.grasp_to_tip_m])
-    return HeldTool(tip, probe.tip_radius_m, 0.5 * probe.shaft_diameter_m, probe.handle_m[1], home_yaw)
+    return HeldTool(tip, probe.tip_radius_m, probe.handle_m[1], home_yaw)
 
 
 def traced(index: int, outline_K_m: Array, height_m: float) -> Candidate:

@@ -59,7 +59,7 @@ def handle_mesh(probe: Probe) -> Mesh:
     return Mesh("handle", corners, np.array(_BOX_FACES), f"handle {probe.handle_m}")
 
 
-def _compliant(spec: mujoco.MjSpec, body: mujoco.MjsBody, probe: Probe, truth: Truth) -> mujoco.MjsBody:
+def _compliant(body: mujoco.MjsBody, probe: Probe, truth: Truth) -> mujoco.MjsBody:
     """Return the body of the shaft: `probe` itself if it is rigid, else a body that turns in the handle's centre.
 
     The gel's shear layer and the fingers carry the handle; springs between handle and shaft stand for them. The
@@ -112,7 +112,7 @@ def add_probe(spec: mujoco.MjSpec, probe: Probe, holder: Holder, truth: Truth) -
     body.inertia = (across, across, probe.mass_kg * (probe.handle_m[0] ** 2 + probe.handle_m[1] ** 2) / 12)
 
     top, ball = pose_handle_shaft.apply([(0.0, 0.0, hz), (0.0, 0.0, probe.grasp_to_tip_m)])
-    lower = _compliant(spec, body, probe, truth)
+    lower = _compliant(body, probe, truth)
     shaft = lower.add_geom(name="shaft", type=mujoco.mjtGeom.mjGEOM_CYLINDER, rgba=STEEL_COLOUR)
     shaft.fromto = (*top, *ball)
     shaft.size = (0.5 * probe.shaft_diameter_m, 0.0, 0.0)

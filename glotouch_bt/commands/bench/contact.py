@@ -49,11 +49,15 @@ def contact(
         shard=shared.read_shard(shard),
     )
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         ending = row["cause"] or f"centre {row['centre_error_mm']:.2f} mm"
         return f"{row['tool']} {row['square']} seed {row['seed']}: {ending}"
 
     summary = shared.run_in_pool(
-        run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told, lambda row: not row["cause"]
+        run_campaign,
+        campaign,
+        shared.Executors(workers, cluster, trial_limit),
+        describe_row,
+        lambda row: not row["cause"],
     )
     shared.print_summary(summary, campaign.out, print_contact, json_)

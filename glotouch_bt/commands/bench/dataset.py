@@ -67,10 +67,10 @@ def dataset(
         command = f"glotouch bench dataset {shlex.join(words)}"
         return make_dataset(given, pool, show, out=folder / "dataset", name=name, version=version, command=command)
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         return f"{row['conditions']} seed {row['seed']}: {row['ended']}, {row['touched']} of {row['objects']} touched"
 
-    manifest = shared.run_in_pool(run, campaigns, shared.Executors(workers, cluster, trial_limit), told)
+    manifest = shared.run_in_pool(run, campaigns, shared.Executors(workers, cluster, trial_limit), describe_row)
     if json_:
         shared.print_json(manifest)
     else:

@@ -39,10 +39,10 @@ def growth(
         shard=shared.read_shard(shard),
     )
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         where = f"{row['objects']} objects, {row['area']:g} areas, seed {row['seed']}"
         return f"{where}: {row['found']} found, {row['travel_m']:.2f} m, {row['cause'] or row['ended']}"
 
     executors = shared.Executors(workers, cluster, trial_limit)
-    summary = shared.run_in_pool(run_growth, campaign, executors, told)
+    summary = shared.run_in_pool(run_growth, campaign, executors, describe_row)
     shared.print_summary(summary, campaign.out, print_growth, json_)

@@ -69,10 +69,10 @@ def match(
         shard=shared.read_shard(shard),
     )
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         right = ", ".join(f"{name} {n}" for name, n in row["right"].items()) or "none"
         touched = f"{row['touched']} of {row['objects']} touched"
         return f"seed {row['seed']}: {row['ended']}, {touched}; right: {right}"
 
-    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
+    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), describe_row)
     shared.print_summary(summary, campaign.out, print_match, json_)

@@ -60,10 +60,10 @@ def retrieve(
         shard=shared.read_shard(shard),
     )
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         return f"{row['target']} seed {row['seed']}: {row['cause'] or 'retrieved'}"
 
     summary = shared.run_in_pool(
-        run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told, succeeded
+        run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), describe_row, succeeded
     )
     shared.print_summary(summary, campaign.out, print_retrieve, json_)

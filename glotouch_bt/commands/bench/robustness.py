@@ -47,12 +47,12 @@ def robustness(
         shard=shared.read_shard(shard),
     )
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         where = f"{row['axis']} {row['level']:g}" if row["axis"] else conditions
         if missions:
             return f"{where} seed {row['seed']}: {row['target']} {row['cause'] or 'retrieved'}"
         return f"{where} seed {row['seed']}: {row['accepted']} of {row['decisions']} right and accepted{row['cause']}"
 
     executors = shared.Executors(workers, cluster, trial_limit)
-    summary = shared.run_in_pool(run_missions if missions else run_campaign, campaign, executors, told)
+    summary = shared.run_in_pool(run_missions if missions else run_campaign, campaign, executors, describe_row)
     shared.print_summary(summary, campaign.out, print_robustness, json_)

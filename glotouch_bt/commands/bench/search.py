@@ -86,9 +86,9 @@ def search(
         recorded=tuple(recorded or ()),
     )
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         found = f"{len(row['discovered_m'])} found, {row['travel_m']:.2f} m, {row['ended']}"
         return f"{row['simulator']} {row['policy']} seed {row['seed']}: {found}"
 
-    summary = shared.run_in_pool(run_campaign, campaign, executors, told)
+    summary = shared.run_in_pool(run_campaign, campaign, executors, describe_row)
     shared.print_summary(summary, campaign.out, print_search, json_)

@@ -49,13 +49,17 @@ def space(
         shard=shared.read_shard(shard),
     )
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         moved = [t for t in row["objects"] if t["done"]]
         errors = ", ".join(f"{t['position_error_mm']:.1f}" for t in moved if t.get("position_error_mm") is not None)
         ending = row["cause"] or f"{len(moved)} of {len(row['objects'])} moved, {errors or '-'} mm off"
         return f"{row['act']} seed {row['seed']}: {ending}"
 
     summary = shared.run_in_pool(
-        run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told, lambda row: not row["cause"]
+        run_campaign,
+        campaign,
+        shared.Executors(workers, cluster, trial_limit),
+        describe_row,
+        lambda row: not row["cause"],
     )
     shared.print_summary(summary, campaign.out, print_space, json_)

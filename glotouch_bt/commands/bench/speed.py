@@ -36,9 +36,9 @@ def speed(
         out=shared.bench_folder(out, "speed"),
     )
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         speed = f"{row['sim_s']:.0f} s in {row['wall_s']:.1f} s ({row['realtime_factor']:.1f}x)"
         return f"seed {row['seed']}: {row['status']}, {speed}, {row['over_physics']:.2f}x the bare steps"
 
-    summary = run_study(study, shared.progress(told))
+    summary = run_study(study, shared.progress(describe_row))
     shared.print_summary(summary, study.out, print_speed, json_)

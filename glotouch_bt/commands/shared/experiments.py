@@ -20,9 +20,9 @@ C = TypeVar("C")
 Show = Callable[[Any, int, int], None]
 
 
-def progress(told: Callable[[Any], str]) -> Show:
+def progress(describe_row: Callable[[Any], str]) -> Show:
     """Return a function that prints the line of a row on stderr, after its number."""
-    return lambda row, done, total: print(f"[{done}/{total}] {told(row)}", file=sys.stderr)
+    return lambda row, done, total: print(f"[{done}/{total}] {describe_row(row)}", file=sys.stderr)
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def run_in_pool(
     run: Callable[[C, Executor, Show], dict[str, Any]],
     campaign: C,
     executors: Executors,
-    told: Callable[[Any], str],
+    describe_row: Callable[[Any], str],
     succeeded: Callable[[Any], bool] | None = None,
 ) -> dict[str, Any]:
     """Run a campaign in worker processes; return its summary.
@@ -61,7 +61,7 @@ def run_in_pool(
         run: Runs the campaign on an executor.
         campaign: Its settings.
         executors: The processes.
-        told: Returns the line of a row.
+        describe_row: Returns the line of a row.
         succeeded: Returns True for the row of a success.
 
     Raises:
@@ -71,7 +71,7 @@ def run_in_pool(
     from glotouch_bt.commands.terminal import CampaignProgress
 
     try:
-        with executors.pool() as pool, CampaignProgress(told, succeeded) as progress:
+        with executors.pool() as pool, CampaignProgress(describe_row, succeeded) as progress:
             return run(campaign, pool, progress)
     except ShardDone as e:
         sys.stderr.write(f"{e}; when all are done, the same command with --resume instead of --shard sums them up\n")

@@ -23,12 +23,12 @@ class CampaignProgress:
     """Shows each trial, and how the campaign goes; call it with (row, trials done, trials in all).
 
     Args:
-        told: Returns the line of a row.
+        describe_row: Returns the line of a row.
         succeeded: Returns True for a row that counts as a success; None: no rate of success is shown.
     """
 
-    def __init__(self, told: Callable[[Any], str], succeeded: Callable[[Any], bool] | None = None) -> None:
-        self._told, self._succeeded = told, succeeded
+    def __init__(self, describe_row: Callable[[Any], str], succeeded: Callable[[Any], bool] | None = None) -> None:
+        self._describe_row, self._succeeded = describe_row, succeeded
         self._began = time.perf_counter()
         self._rows = self._good = 0
         self._last: deque[tuple[int, str]] = deque(maxlen=LAST)
@@ -54,7 +54,7 @@ class CampaignProgress:
         """Show a row that this command has made, after `done - 1` others of `total`."""
         self._rows += 1
         self._good += self._succeeded is not None and self._succeeded(row)
-        line = self._told(row)
+        line = self._describe_row(row)
         if self._live is None:
             sys.stderr.write(f"[{done}/{total}{self._rest(done, total)}] {line}\n")
             return

@@ -250,8 +250,7 @@ class ForEachKind(NodeKind):
             else:
                 failure = sets.union(failure, after_none.failure, after_some.failure)
                 ends_none, ends_some = EMPTY, succeeded
-            if flow.preemptible(node):
-                running = sets.union(running, ends_none, ends_some)
+            running = sets.union(running, ends_none, ends_some)
             failure = sets.union(failure, ends_none)
             none, some = sets.union(none, ends_none), sets.union(some, ends_some)
         return ExitStates(sets.union(start, some), sets.union(failure, _cleared(flow, unset, pairs)), running)

@@ -21,7 +21,6 @@ class Fit:
         z0_m: Height offset.
         scale: Model scale.
         bias_m: Aperture bias.
-        reflected: Relative yaw of the first scan in (90, 270] deg (a scan's reflection is a turn by 180).
     """
 
     yaw_rad: float
@@ -29,7 +28,6 @@ class Fit:
     z0_m: float
     scale: float
     bias_m: float
-    reflected: bool
 
 
 @dataclass(frozen=True)

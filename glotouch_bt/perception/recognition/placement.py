@@ -85,6 +85,5 @@ def fitted_pose(
     middle_K = np.linalg.solve(normal, right)
     c, s = math.cos(theta), math.sin(theta)
     origin = middle_K - np.array([[c, -s], [s, c]]) @ (scale * model.centre_m)
-    relative = math.remainder(phi0, 2 * math.pi)
-    fit = Fit(theta, float(shift_m[last]), z0_m, scale, bias_m, abs(relative) > math.pi / 2)
+    fit = Fit(theta, float(shift_m[last]), z0_m, scale, bias_m)
     return fit, (float(origin[0]), float(origin[1]), theta)

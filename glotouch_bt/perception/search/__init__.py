@@ -26,6 +26,6 @@ from glotouch_bt.perception.search.policies import (
 from glotouch_bt.perception.search.remaining import chance_left, left_in_words
 from glotouch_bt.perception.search.routes import Routes, segment_is_free
 from glotouch_bt.perception.search.seeking import Sought, seek
-from glotouch_bt.perception.search.sharing import OVERLAP_M, overlap_depth_m
+from glotouch_bt.perception.search.sharing import contradictions
 from glotouch_bt.perception.search.top import BallMove, BallOutcome, Top, TopPlan, TopRule, rounds, top_plan
 from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams, trace, trace_more

@@ -113,7 +113,7 @@ def overlaps(old: Candidate, points: Array) -> bool:
     return float(outside_m.min()) <= SAME_M or _apart_m(old.contacts, points) <= BETWEEN_M
 
 
-def is_over(old: Candidate, traced: OutlineTrace) -> bool:
+def lies_over(old: Candidate, traced: OutlineTrace) -> bool:
     """Return True if a whole trace lies over or close to a candidate: it was pushed, or a part protrudes from it.
 
     A trace round a neighbour has contacts on its far side.

@@ -162,7 +162,10 @@ def distinct(candidates: tuple[Candidate, ...], preferred: frozenset[int] = froz
 
 
 def same_body(a: Candidate, b: Candidate) -> bool:
-    """Return True if the centre of each candidate lies inside the other's envelope: bodies do not overlap so far."""
+    """Return True if the centre of each candidate lies inside the other's envelope.
+
+    Two bodies cannot overlap by that much.
+    """
     pairs = ((a, b), (b, a))
     return all(float(signed_distance(envelope(c), o.contour.centre_K_m[None])[0]) < 0.0 for c, o in pairs)
 

@@ -9,7 +9,7 @@ from itertools import chain, count
 import numpy as np
 import scipy
 
-from glotouch_bt.perception.search.belonging import MAX_LENGTH_M, is_fully_traced, is_over, overlaps
+from glotouch_bt.perception.search.belonging import MAX_LENGTH_M, is_fully_traced, lies_over, overlaps
 from glotouch_bt.perception.search.bodies import (
     SEPARATE_NATS,
     Doubt,
@@ -216,7 +216,7 @@ def regroup(admitted: Admitted, whole: int, part: int, more: OutlineTrace, exclu
         belief, changed = belief.without_exclusion(part), tuple(i for i in changed if i != part)
         del every[part]
         parts = (split_at_motion(parts[0], radius, likely=len(one.contacts))[1],)
-    return _shared_out(
+    return _assign_parts(
         replace(admitted, belief=belief, changed=changed), every, (one, other), parts, radius, exclusion_m
     )
 
@@ -270,7 +270,7 @@ def all_separated(admitted: Admitted, radius_m: float, exclusion_m: float) -> Ad
     return _admitted(belief, every, radius_m, admitted.index if admitted.index in every else changed[0], changed)
 
 
-def _shared_out(
+def _assign_parts(
     admitted: Admitted,
     every: dict[int, Candidate],
     pair: tuple[Candidate, Candidate],
@@ -365,7 +365,7 @@ def _merged(
     Contacts that one body explains best if it moved are those after the motion. The union may still be several bodies.
     """
     points = np.array([c.point_K_m for c in traced.contacts])
-    if not overlaps(old, points) and not (is_fully_traced(old) and is_over(old, traced)):
+    if not overlaps(old, points) and not (is_fully_traced(old) and lies_over(old, traced)):
         return None
     shift = np.array([*traced.displaced_K_m, 0.0])
     before = (replace(c, tip_K_m=c.tip_K_m + shift, point_K_m=c.point_K_m + shift[:2]) for c in old.contacts)

@@ -30,7 +30,7 @@ DROPPED_M = 0.004
 GRID_STEP_M = 0.005
 """Spacing of grids over the permitted region."""
 MAX_PROTRUSION_M = 0.010
-"""Maximum widening of an envelope by contacts outside the outline; gaps between objects are 30 mm."""
+"""Maximum widening of an envelope by contacts outside the outline. Source: tuned in container_five (gaps of 30 mm)."""
 KNOWN_M = 0.005
 """Maximum distance from the envelope of a traced object at which a contact belongs to it."""
 FACING = -0.4
@@ -175,9 +175,8 @@ class SearchMap:
         """
         if not (np.isfinite(margin_m) and margin_m >= 0):
             raise ParamError("margin_m", margin_m, "finite and not negative")
-        index = (
-            max((e.index for e in self.exclusions if e.index is not None), default=-1) + 1 if index is None else index
-        )
+        if index is None:
+            index = max([self.first_index, *(e.index + 1 for e in self.exclusions if e.index is not None)])
         others = self.without_exclusion(index).exclusions
         return replace(self, exclusions=(*others, Exclusion(contour, margin_m + protrusion_m(contour), index)))
 

@@ -9,7 +9,7 @@ bodies become one, or the contacts of one body pass to several neighbours.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import combinations
@@ -25,7 +25,7 @@ from glotouch_bt.perception.search.bodies import (
 )
 from glotouch_bt.perception.search.tracing import TraceParams
 from glotouch_bt.perception.touch import Candidate, Contact, Contour, signed_distance
-from glotouch_bt.perception.touch.outline import OutlineBelief
+from glotouch_bt.perception.touch.outline import KNOWN_QUALITY, OutlineBelief
 
 OVERLAP_M = 0.008
 """Depth of the overlap, m, above which two outlines contradict each other, because bodies do not overlap. Source: ours;
@@ -81,6 +81,23 @@ def shared_out(
 def overlap_depth_m(a: Contour, b: Contour) -> float:
     """Return how deep one outline reaches into the other; negative if they are apart."""
     return -min(float(signed_distance(one, other.outline_K_m()).min()) for one, other in ((a, b), (b, a)))
+
+
+def contradictions(candidates: Sequence[Candidate]) -> dict[int, str]:
+    """Return the index of each candidate whose outline cannot be right, and why.
+
+    Such an outline is still uncertain, or it is the less certain one of two that overlap: bodies do not. Objects that
+    are pushed while they are traced leave such outlines.
+    """
+    wrong = {c.index: "its outline is still uncertain" for c in candidates if c.quality < KNOWN_QUALITY}
+    for one, other in combinations((c for c in candidates if c.index not in wrong), 2):
+        depth_m = overlap_depth_m(one.contour, other.contour)
+        if depth_m > OVERLAP_M:
+            worse, better = sorted((one, other), key=lambda c: c.quality)
+            wrong.setdefault(
+                worse.index, f"its outline overlaps that of candidate {better.index} by {1e3 * depth_m:.0f} mm"
+            )
+    return wrong
 
 
 def _ids(contacts: tuple[Contact, ...]) -> frozenset[int]:

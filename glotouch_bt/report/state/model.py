@@ -39,12 +39,12 @@ SAMPLES_A_PERIOD = 10
 """Samples in a control period of 10 ms."""
 LOG_LINES = 200
 """Events in the log of a state."""
-NO_WINDOW_M = (0.017, 0.028)
+DEFAULT_PAD_WINDOW_M = (0.017, 0.028)
 """Size of a pad along x_P and z_P if the record has none. Source: the shipped gripper, rounded."""
 _PHASES: dict[str, Phase] = {"pause": "pausing", "paused": "paused", "resumed": "running"}
 RESULTS = frozenset({"SUCCESS", "FAILURE"})
 """Status of a node that has ended. It stays in view when the node is reset, until it runs again."""
-LOST = frozenset({"tool_lost", "no_probe"})
+PROBE_LOST_CODES = frozenset({"tool_lost", "no_probe"})
 """Codes of failures that say that the probe is neither in the jaws nor in its holder."""
 NEAR_S = 1.0
 """A node that failed within this time of a mark needs none of its own."""
@@ -199,7 +199,7 @@ class RunModel:
             window = self.record.of_run("robot", "description", "gripper", "pad_window_m") if self.record else None
             x, z = parse.vector(window, 2).tolist()
         except parse.MALFORMED:
-            return NO_WINDOW_M
+            return DEFAULT_PAD_WINDOW_M
         return x, z
 
     @classmethod
@@ -339,7 +339,7 @@ class RunModel:
             length = data.get("grasp_to_tip_m") if data.get("held") else None
             self._tips.add(stamp_s, float(length) if isinstance(length, int | float) else None)
             self._lost.add(stamp_s, False)
-        if kind == "failure" and data.get("code") in LOST:
+        if kind == "failure" and data.get("code") in PROBE_LOST_CODES:
             self._lost.add(stamp_s, True)
         if phase := _PHASES.get(kind):
             self._phases.add(stamp_s, phase)

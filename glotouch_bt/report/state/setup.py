@@ -13,7 +13,7 @@ import numpy as np
 from glotouch_bt.mission import node_paths
 from glotouch_bt.mission.read import shipped_root
 from glotouch_bt.report.run_record import RunRecord
-from glotouch_bt.report.state.model import NO_WINDOW_M
+from glotouch_bt.report.state.model import DEFAULT_PAD_WINDOW_M
 from glotouch_bt.robot import Array, BadInput, Container, Holder, Pose, Probe, RobotDescription
 from glotouch_bt.robot.scene import Mesh, load_mesh, stl_files
 
@@ -29,7 +29,7 @@ class RunSetup:
     Attributes:
         pose_B_K: The registered container frame in B.
         description: The robot.
-        container, holder, probe: The told world.
+        container, holder, probe: The nominal world.
         window_m: Size of a pad along x_P and z_P.
         objects: Folder of the STL files of its objects, if it is known here.
     """
@@ -39,7 +39,7 @@ class RunSetup:
     container: Container | None = None
     holder: Holder | None = None
     probe: Probe | None = None
-    window_m: tuple[float, float] = NO_WINDOW_M
+    window_m: tuple[float, float] = DEFAULT_PAD_WINDOW_M
     objects: Path | None = None
 
     @cached_property
@@ -71,7 +71,7 @@ def read_setup(record: RunRecord, objects: Path | None = None) -> RunSetup:
         container=_part(record.run.get("container"), Container),
         holder=_part(record.run.get("holder"), Holder),
         probe=_part(record.run.get("probe"), Probe),
-        window_m=NO_WINDOW_M if description is None else description.gripper.pad_window_m,
+        window_m=DEFAULT_PAD_WINDOW_M if description is None else description.gripper.pad_window_m,
         objects=objects or _shipped(record.of_run("objects", "folder")),
     )
 

@@ -22,9 +22,8 @@ class SupervisionLimits:
         wrench_samples: Consecutive samples beyond the stop limit of the wrench that trip the guard. Source: the
             simulated backend's own limit, 5 ms; shorter peaks are noise or the ringing of a stop.
         following_m, following_rad: Largest distance and angle between the hand's measured and commanded pose. The
-            joints
-            are not compared: a device that is sent poses chooses its own posture. Source: ten times the values measured
-            in a whole retrieval (harsh, MuJoCo): 0.5 mm at 8 N, 0.003 rad.
+            joints are not compared: a device that is sent poses chooses its own posture. Source: ten times the values
+            measured in a whole retrieval (harsh, MuJoCo): 0.5 mm at 8 N, 0.003 rad.
         following_periods: A hand that leaves its path must also be within these distances so many periods later, at
             its present speed away from it. Source: ours, the periods until a stop takes effect, doubled. Undisturbed
             hands leave their paths at 20 mm/s at most.
@@ -116,7 +115,7 @@ class TransientCounter:
     """Count transient findings of each guard within a sliding window."""
 
     def __init__(self, limits: SupervisionLimits) -> None:
-        self._most, self._window_s = limits.tolerated, limits.window_s
+        self._max_findings, self._window_s = limits.tolerated, limits.window_s
         self._stamps: dict[str, list[float]] = {}
 
     def exceeded(self, guard: str, stamp_s: float, count: int = 1) -> bool:
@@ -124,4 +123,4 @@ class TransientCounter:
         recent = [s for s in self._stamps.get(guard, ()) if 0.0 <= stamp_s - s < self._window_s]
         recent += [stamp_s] * count
         self._stamps[guard] = recent
-        return len(recent) > self._most
+        return len(recent) > self._max_findings

@@ -119,7 +119,7 @@ class ReadingsGuard:
             self._targets.append(newest)
 
     def check(self, o: Observation) -> tuple[Observation, list[GuardFinding]]:
-        """Return the block without its unusable samples, and the findings, gravest last.
+        """Return the block without its unusable samples, and the findings, most severe last.
 
         A block without any usable sample is returned unchanged, with a fatal finding.
         """

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glotouch_bt.motion import finger_outline_half_m
 from glotouch_bt.perception.touch import GuardParams
 from glotouch_bt.perception.touch.calibration import UNMEASURED_M_N
-from glotouch_bt.perception.touch.detection import Disc, Section, section_point
-from glotouch_bt.robot import Array, Pose, World
+from glotouch_bt.perception.touch.detection import Disc, Polygon, Section, section_point
+from glotouch_bt.robot import Array, Gripper, Pose, World
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,6 @@ class HeldTool:
     Attributes:
         tip_P_m: (3,) reference point in P: centre of the ball, or of the fingers' lower end.
         tip_radius_m: Ball radius; for fingers, radius of the disc of equal area.
-        shaft_radius_m: Shaft radius.
         aperture_m: Reported aperture with the handle between the pads.
         yaw_B_rad: Yaw of x_P in B at which the probe was grasped; the hand keeps it while it probes.
         floor_z_K_m: Height of the floor in K as measured with the tip; 0 if registration and grasp are perfect.
@@ -35,7 +35,6 @@ class HeldTool:
 
     tip_P_m: Array
     tip_radius_m: float
-    shaft_radius_m: float
     aperture_m: float
     yaw_B_rad: float
     floor_z_K_m: float = 0.0
@@ -45,6 +44,24 @@ class HeldTool:
     corner: Array | None = None
     corner_K_m: Array | None = None
     compliance_P_m_N: Array | None = None
+
+    @classmethod
+    def fingers(cls, gripper: Gripper, aperture_m: float, yaw_B_rad: float) -> HeldTool:
+        """Return the bare fingers as a tool.
+
+        Args:
+            gripper: The robot's gripper.
+            aperture_m: Aperture of the jaws.
+            yaw_B_rad: Yaw of x_P in B.
+        """
+        half = finger_outline_half_m(gripper, aperture_m)
+        return cls(
+            tip_P_m=np.array([gripper.finger.centre_m[0], 0.0, gripper.fingertip_below_P_m]),
+            tip_radius_m=float(np.sqrt(4.0 * half[0] * half[1] / np.pi)),
+            aperture_m=aperture_m,
+            yaw_B_rad=yaw_B_rad,
+            section=Polygon.rectangle(*half),
+        )
 
     @property
     def round(self) -> bool:

@@ -103,7 +103,7 @@ class _Forking(FaultInjector):
                 found = self._child(name, call)
                 if found is None:  # this is the child
                     self.failing = name, call
-                    self.arm(_fault(name))
+                    self.add_fault(_fault(name))
                     return
                 if (problems := found) != HANGS:
                     break

@@ -44,7 +44,7 @@ def accepted_faults(request: RunRequest) -> dict[str, dict[str, list[int]]]:
         def accepts(plan: FaultPlan) -> bool:
             try:
                 wrong_models(plan, mission, Path(folder))
-                injector.arm(*plan.faults)
+                injector.add_fault(*plan.faults)
             except BadInput:
                 return False
             return True

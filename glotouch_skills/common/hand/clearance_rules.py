@@ -35,8 +35,9 @@ def may_touch(arm: Arm, part: str, *obstacles: str) -> Iterator[None]:
 def neighbours(candidates: Iterable[Candidate], index: int) -> list[Candidate]:
     """Return the candidates to keep clear of while the hand works on the one of an index.
 
-    Of two candidates with the centre of one inside the outline of the other, at least one outline is wrong: bodies do
-    not overlap so far. Such a neighbour would keep the hand off the object that it may be, and the descent is guarded.
+    Of two candidates with the centre of one inside the outline of the other, at least one outline is wrong: two
+    bodies cannot overlap by that much. Such a neighbour may be the object itself and would keep the hand off it; the
+    descent is guarded.
     """
     every = list(candidates)
     own = next((c for c in every if c.index == index), None)

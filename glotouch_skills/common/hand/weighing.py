@@ -1,4 +1,4 @@
-"""Weigh what hangs in the hand, by the tared wrist, and ask all other witnesses of a hold."""
+"""Weigh the load in the hand with the tared wrist, and check a hold by weight, jaws and gels."""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ class Hold:
     jaw_N: float
     gels_touched: int | None
 
-    def doubts(
+    def failed_checks(
         self, min_weight_N: float, slip_m: float, min_aperture_m: float = MIN_GRIP_M, *, may_turn: bool = False
     ) -> list[str]:
-        """Return what each witness (wrist, jaws, gels) has against the hold.
+        """Return the failed checks of the hold, by wrist, jaws and gels.
 
         With `may_turn`, jaws that closed farther still hold what both gels feel: it turned between them.
         """
@@ -102,15 +102,15 @@ class Hold:
         }
 
 
-def feel_hold(arm: Arm, grip_m: float, look_s: float) -> Motion[Hold]:
-    """Stand still and ask every witness of the hold.
+def feel_hold(arm: Arm, grip_m: float, measure_s: float) -> Motion[Hold]:
+    """Stand still and measure the hold with wrist, jaws and gels.
 
     Args:
         arm: At rest, the object lifted.
         grip_m: Aperture when the jaws had closed.
-        look_s: Time for which jaws and gels are measured.
+        measure_s: Time for which jaws and gels are measured.
     """
-    blocks = yield from arm.hold(look_s, tactile=True)
+    blocks = yield from arm.hold(measure_s, tactile=True)
     weight_N = yield from weigh_N(arm)
     apart = float(np.median([b.gripper.aperture_m for b in blocks]))
     jaw_N = float(np.median([b.gripper.force_N for b in blocks]))

@@ -27,7 +27,8 @@ IN_COLUMN_M = 0.002
 """A descent within this distance of a place where the tool stood before is free: the difference of the radii of ball
 and shaft. Source: ours."""
 HELD_TOLERANCE_M = 0.004
-"""The tool is held if the aperture is within this of the one at which the jaws closed on it."""
+"""The tool is held if the aperture is within this of the handle's width, or of the aperture at which the jaws closed on
+it: twice the largest bias, and compliance."""
 MAX_LOST_SHARE = 0.5
 """Weigh the probe in free air if more than this share of its weight disappears from one rest to the next."""
 COLUMN_M_S = 0.04

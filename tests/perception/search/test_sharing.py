@@ -8,9 +8,9 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from glotouch_bt.perception.search import SearchMap, overlap_depth_m, separated
+from glotouch_bt.perception.search import SearchMap, separated
 from glotouch_bt.perception.search.candidates import Admitted, all_separated
-from glotouch_bt.perception.search.sharing import OVERLAP_M
+from glotouch_bt.perception.search.sharing import OVERLAP_M, overlap_depth_m
 from glotouch_bt.perception.touch import Candidate, Contact
 from tests.support.ball_contacts import R, box, candidate, disc
 

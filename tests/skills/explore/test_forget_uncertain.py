@@ -46,7 +46,7 @@ def test_a_wrong_outline_is_forgotten(bench, found, expected, gap_m: float, qual
     b, things = bench(), three(found, gap_m, quality)
     before = searched(things, expected)
     skill = run(b, things, before)
-    assert (skill.certain, [row[:2] for row in skill.retraced]) == (False, [("1", "1")])
+    assert (skill.search_done, [row[:2] for row in skill.retraced]) == (False, [("1", "1")])
     assert skill.candidates == (things[0], things[2])
     assert {t.candidate for t in skill.probed} == {0, 2}
     assert skill.map.expected == (None if expected is None else 3), "it is searched for, also beyond a known number"
@@ -61,11 +61,11 @@ def test_a_wrong_outline_is_forgotten(bench, found, expected, gap_m: float, qual
 
 
 def test_a_map_that_may_be_right_is_kept(bench, found) -> None:
-    """Discs that overlap by 5 mm may be off by that; what was not refined may still become certain."""
+    """Discs that overlap by 5 mm may be off by that; what was not refined may still become search_done."""
     for things, traced in ((three(found, -0.005), (0, 1, 2)), (three(found, quality=0.1), (0, 2))):
         before = searched(things)
         skill = run(bench(), things, before, traced)
-        assert (skill.certain, skill.candidates, skill.retraced) == (True, things, ())
+        assert (skill.search_done, skill.candidates, skill.retraced) == (True, things, ())
         np.testing.assert_array_equal(skill.map.path_K_m, before.path_K_m)
 
 
@@ -73,7 +73,7 @@ def test_one_that_is_missing_is_searched_for(bench, found) -> None:
     """Two outlines turned out to be one body after the search had ended."""
     things = three(found)
     skill = run(bench(), things[:2], searched(things))
-    assert (skill.certain, skill.candidates) == (False, things[:2])
+    assert (skill.search_done, skill.candidates) == (False, things[:2])
     assert not skill.map.complete
     assert skill.retraced == (("1", "-", MISSING),)
 
@@ -82,9 +82,9 @@ def test_it_forgets_only_so_often(bench, found) -> None:
     things = three(found, quality=0.1)
     rounds = (("1", "4", "uncertain"), ("1", "5", "uncertain"))
     again = run(bench(), things, searched(things), before_retraced=rounds)
-    assert (again.certain, len(again.retraced)) == (False, 3)
+    assert (again.search_done, len(again.retraced)) == (False, 3)
     last = run(bench(), things, searched(things), before_retraced=again.retraced)
-    assert (last.certain, last.candidates, last.retraced) == (True, things, again.retraced)
+    assert (last.search_done, last.candidates, last.retraced) == (True, things, again.retraced)
 
 
 def test_without_a_map_it_fails(bench) -> None:

@@ -80,10 +80,10 @@ def faults(
         keep=keep,
     )
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         what = f"{row['class']} in {row['skill']}" if row["skill"] else "unfaulted"
         ending = f"{row['verdict']} {row.get('cause') or ''}" if row["effective"] else "altered nothing"
         return f"seed {row['seed']} {what}: {ending} ({row['wall_s']:.0f} s)"
 
-    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
+    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), describe_row)
     shared.print_summary(summary, campaign.out, print_faults, json_)

@@ -83,7 +83,7 @@ def forces(
     else:
         campaign = _random(bases, mission or list(MISSIONS), few, keep)
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         peak = row.get("peak_force_N")
         force = "peak unknown" if peak is None else f"peak {peak:.1f} N"
         ending = f"{row['status']} {row.get('cause') or ''}".strip()
@@ -92,7 +92,7 @@ def forces(
             f"{ending}, {force} ({row['wall_s']:.0f} s)"
         )
 
-    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
+    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), describe_row)
     shared.print_summary(summary, folder, print_forces, json_)
 
 

@@ -33,10 +33,10 @@ def fuzz(
         raise UnknownName("kind of input", kind, KINDS)
     campaign = FuzzCampaign(trials, seed, shared.bench_folder(out, "fuzz"), kind, resume, shared.read_shard(shard))
 
-    def told(counts: Mapping[str, int]) -> str:
+    def describe_row(counts: Mapping[str, int]) -> str:
         return f"{sum(counts.get(name, 0) for name in BAD)} bad"
 
-    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), told)
+    summary = shared.run_in_pool(run_campaign, campaign, shared.Executors(workers, cluster, trial_limit), describe_row)
     shared.print_summary(summary, campaign.out, _print_fuzz, json_)
     return 1 if summary["failures"] else 0
 

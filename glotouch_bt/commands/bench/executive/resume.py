@@ -42,7 +42,7 @@ def resume(
         resume=resume,
     )
 
-    def told(row: dict[str, Any]) -> str:
+    def describe_row(row: dict[str, Any]) -> str:
         at = f"seed {row['seed']}: {row['outcome']} at {row['moment']:.0%} of the mission"
         if row["outcome"] == "killed":
             end = "same end" if row["same_end"] else f"DIFFERENT end: {row.get('status')} {row['message']}"
@@ -50,7 +50,7 @@ def resume(
             at += f", checkpoint {row.get('checkpoint')} of {row.get('checkpoints')}: {end}{exact}"
         return at
 
-    summary = run_study(study, shared.progress(told))
+    summary = run_study(study, shared.progress(describe_row))
     if json_:
         shared.print_json(summary)
         return

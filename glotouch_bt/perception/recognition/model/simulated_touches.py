@@ -62,7 +62,7 @@ def _fast_shift(rel_m: Array32, pad: PadSpec) -> Array32:
     return np.asarray(shifts[i - 1] + f * step, dtype=np.float32)[:, None]
 
 
-def simulated_statistics(fine_m: Array32, stride: int, pad: PadSpec) -> tuple[float, float, float]:
+def simulated_statistics(fine_m: Array32, pad: PadSpec) -> tuple[float, float, float]:
     """Return (rho_M, its deviation, d_M) over touches at every third yaw, shifts within 12 mm and four heights."""
     yaws, fl, fz = fine_m.shape
     coarse = PadSpec(pad.window_m, FINE, pad.depth_m, pad.stiffness_N_m3, pad.limit_m, pad.force_N)

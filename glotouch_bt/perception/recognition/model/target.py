@@ -284,7 +284,7 @@ def _build(mesh: Mesh, pad: PadSpec) -> TargetModel:
     half, h = FINE[0] // 2, FINE[1] // 2
     reach = window_max(fine)[:, h:-h:STRIDE, half:-half:STRIDE]
     reach = np.where(np.isfinite(reach), reach, np.nan).astype(np.float32)
-    rho, rho_sd, dispersion = simulated_statistics(fine, STRIDE, pad)
+    rho, rho_sd, dispersion = simulated_statistics(fine, pad)
     for a in (reach, fine):
         a.setflags(write=False)
     return TargetModel(

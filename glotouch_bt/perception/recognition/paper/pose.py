@@ -54,8 +54,7 @@ def pose_of_fit(
     c, s = math.cos(yaw), math.sin(yaw)
     middle_K = centre_K_m + np.linalg.solve(normal, right)
     origin = middle_K - np.array([[c, -s], [s, c]]) @ (chosen.scale * model.centre_m)
-    reflected = abs(math.remainder(phi, 2 * math.pi)) > math.pi / 2
-    found = Fit(yaw, chosen.shift_m, chosen.z0_m, chosen.scale, chosen.bias_m, reflected)
+    found = Fit(yaw, chosen.shift_m, chosen.z0_m, chosen.scale, chosen.bias_m)
     return found, (float(origin[0]), float(origin[1]), yaw)
 
 

@@ -33,13 +33,13 @@ class RandomDescent:
     def __init__(self, seed: int = 0, *, max_descents: int = 200) -> None:
         if max_descents < 1:
             raise ParamError("max_descents", max_descents, "at least 1")
-        self._seed, self._most = seed, max_descents
+        self._seed, self._max_descents = seed, max_descents
 
     def next_stretch(self, belief: SearchMap, tip_K_m: Array) -> Stretch | None:
         """See `SearchPolicy`."""
         path, tip = belief.path_K_m, np.asarray(tip_K_m, dtype=np.float64)[:2]
         hops = int(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1) > HOP_M)) if len(path) > 1 else 0
-        if hops + len(belief.dropped) >= self._most:
+        if hops + len(belief.dropped) >= self._max_descents:
             return None
         here = zlib.crc32(np.rint(tip * 1e6).astype(np.int64).tobytes())
         rng = np.random.default_rng((self._seed, len(path), len(belief.dropped), here))

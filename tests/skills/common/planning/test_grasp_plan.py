@@ -72,7 +72,7 @@ def layer(
 
 
 def matched(x: float = 0.0, y: float = 0.0, yaw: float = 0.0, *, fitted: bool = False) -> Match:
-    fit = Fit(yaw, 0.0, 0.0, 1.0, 0.0, False) if fitted else None
+    fit = Fit(yaw, 0.0, 0.0, 1.0, 0.0) if fitted else None
     return Match(0, 1.0, {}, fit, (x, y, yaw), 3.0)
 
 
