@@ -97,6 +97,19 @@ def test_class_names_are_unique() -> None:
 
 def test_standard_words_are_used() -> None:
     """`max_` and `min_`, as everywhere else."""
-    pattern = re.compile(r"\b_?(?:most|least|MOST|LEAST)_(?!common\b|squares\b)\w+")
+    pattern = re.compile(r"\b_?(?:most|least|MOST|LEAST)_(?!common\b|squares\b)\w+|\b_(?:most|least)\b")
     used = {str(r): sorted(set(found)) for p, r in FILES.items() if (found := pattern.findall(p.read_text()))}
     assert used == {}
+
+
+def test_docstrings_name_the_thing() -> None:
+    """A docstring says what the thing is or does; a question word begins no such sentence."""
+    asking = ("What", "How", "Where", "Whether", "Which", "Why")
+    found = []
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                said = ast.get_docstring(node) or ""
+                if said.split(maxsplit=1)[:1] and said.split(maxsplit=1)[0] in asking:
+                    found.append(f"{FILES[path]}: {said.splitlines()[0]}")
+    assert found == []

@@ -111,7 +111,7 @@ def finished(out: Path, name: str) -> dict[str, Any] | None:
 
 @dataclass(frozen=True)
 class _Task:
-    """What the commands of one claim have in common."""
+    """Settings that the commands of one claim share."""
 
     name: str
     out: Path

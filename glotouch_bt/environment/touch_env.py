@@ -40,7 +40,7 @@ TARE_PERIODS = 1000
 
 @dataclass(frozen=True)
 class Transition:
-    """What a reward is computed from.
+    """Data from which a reward is computed.
 
     Attributes:
         before, after: Observations at the beginning and at the end of the period.

@@ -190,14 +190,14 @@ def run_scripted(
     stage.begin_s = robot.observe().now_s
     moving = any(p is None for p in parts.values())
     make_arm = default_arm if moving else lambda robot, world: cast("Arm", StillArm())
-    supervision = PATIENT if isinstance(robot, SkippingRobot) else None
+    guard_limits = PATIENT if isinstance(robot, SkippingRobot) else None
     heard = _Heard(dict.fromkeys(paths, "INVALID"), max_ticks)
     scripted = replace(mission, spec=_played(mission.spec, stage.parts))
     injector = injector_in(robot)
     record: Record = heard if injector is None else ListeningRecord(heard, injector)
     token = STAGE.set(stage)
     try:
-        outcome = run_mission(scripted, robot, record, make_arm=make_arm, timeout_s=end_s, supervision=supervision)
+        outcome = run_mission(scripted, robot, record, make_arm=make_arm, timeout_s=end_s, guard_limits=guard_limits)
     finally:
         STAGE.reset(token)
     if injector is not None:

@@ -9,7 +9,7 @@ from glotouch_bt.motion.paths import Arc, Line, Polyline
 from glotouch_bt.motion.pause_signal import PauseSignal
 from glotouch_bt.motion.plan import plan_piece
 from glotouch_bt.motion.shapes import finger_outline_half_m
-from glotouch_bt.motion.timing import Paces, ProfileLimits, rest_to_rest
+from glotouch_bt.motion.timing import ProfileLimits, SpeedSteps, rest_to_rest
 from glotouch_bt.motion.tool_memory import FREE_M_S, FeltSpace
 from glotouch_bt.motion.travel import Motion, MoveResult, drive
 from glotouch_bt.motion.workspace import out_of_reach

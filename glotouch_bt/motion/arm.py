@@ -20,7 +20,7 @@ from glotouch_bt.motion.jaws import JawRestDetector
 from glotouch_bt.motion.joints import plan_joints
 from glotouch_bt.motion.paths import Arc, Line, Path, Polyline
 from glotouch_bt.motion.plan import plan_piece
-from glotouch_bt.motion.timing import JointProfile, Paces, ProfileLimits
+from glotouch_bt.motion.timing import JointProfile, ProfileLimits, SpeedSteps
 from glotouch_bt.motion.tool_memory import FeltSpace, ToolSeat
 from glotouch_bt.motion.travel import Guard, Motion, Mover, MoveResult
 from glotouch_bt.robot import (
@@ -72,7 +72,7 @@ class MoveOptions(TypedDict, total=False):
 
     acceleration_m_s2: float | None
     jerk_m_s3: float | None
-    paces: Paces
+    speed_steps: SpeedSteps
     guard: Guard | None
     check: bool
     tactile: bool
@@ -176,7 +176,7 @@ class Arm(Mover):
         *,
         acceleration_m_s2: float | None = None,
         jerk_m_s3: float | None = None,
-        paces: Paces = (),
+        speed_steps: SpeedSteps = (),
         guard: Guard | None = None,
         check: bool = True,
         tactile: bool = False,
@@ -188,8 +188,8 @@ class Arm(Mover):
         Args:
             path: Path that begins at the current pose of P.
             speed_m_s, acceleration_m_s2, jerk_m_s3: Limits along the path; the last two default to the robot's limits.
-            paces: Speeds that replace `speed_m_s` from path coordinates on: (coordinate m, speed m/s), ascending. The
-                arm changes between them without a stop.
+            speed_steps: Speeds that replace `speed_m_s` from path coordinates on: (coordinate m, speed m/s), ascending.
+                The arm changes between them without a stop.
             guard: Called once a period with the newest observation. Any value but None stops the motion with the stop
                 deceleration and jerk of the limits, and is returned as `stop`.
             check: Check clearance along the path (reach and joint limits are always checked).
@@ -203,7 +203,7 @@ class Arm(Mover):
         """
         acceleration = self.limits.tcp_acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
         jerk = self.limits.tcp_jerk_m_s3 if jerk_m_s3 is None else jerk_m_s3
-        for speed in (speed_m_s, *(pace for _, pace in paces)):
+        for speed in (speed_m_s, *(pace for _, pace in speed_steps)):
             self._within_limits(speed, acceleration, jerk, what)
         if posture_gain is None:
             posture_gain = POSTURE_GAIN_1_M if guard is None else 0.0
@@ -215,7 +215,9 @@ class Arm(Mover):
                 self.kinematics,
                 piece,
                 q,
-                limits=ProfileLimits(speed_m_s, acceleration, jerk, tuple((at - begin_m, pace) for at, pace in paces)),
+                limits=ProfileLimits(
+                    speed_m_s, acceleration, jerk, tuple((at - begin_m, pace) for at, pace in speed_steps)
+                ),
                 period_s=self.period_s,
                 posture_gain=posture_gain,
                 what=what,

@@ -31,7 +31,7 @@ class Progress:
     a: Array
 
 
-Paces = tuple[tuple[float, float], ...]
+SpeedSteps = tuple[tuple[float, float], ...]
 """Speed limits by place: pairs of a path coordinate, m, in ascending order, and the speed from there on, m/s."""
 
 
@@ -39,25 +39,27 @@ Paces = tuple[tuple[float, float], ...]
 class ProfileLimits:
     """Limits of a time profile: m/s, m/s2, m/s3 (for a joint move per s, s2, s3 of the fraction travelled).
 
-    `paces` replace the speed from their places on. The profile does not stop where the speed limit changes.
+    `speed_steps` replace the speed from their places on. The profile does not stop where the speed limit changes.
     """
 
     speed: float
     acceleration: float
     jerk: float
-    paces: Paces = ()
+    speed_steps: SpeedSteps = ()
 
     def at_most(self, speed: float) -> ProfileLimits:
         """Return the same limits with every speed limited."""
-        paces = tuple((place, min(pace, speed)) for place, pace in self.paces)
-        return ProfileLimits(min(self.speed, speed), self.acceleration, self.jerk, paces)
+        speed_steps = tuple((place, min(pace, speed)) for place, pace in self.speed_steps)
+        return ProfileLimits(min(self.speed, speed), self.acceleration, self.jerk, speed_steps)
 
     def stretches(self, s0: float, s1: float) -> tuple[list[float], list[float]]:
         """Return the lengths and speed limits of the stretches between two coordinates, in order of travel."""
         low, high = min(s0, s1), max(s0, s1)
-        places = [place for place, _ in self.paces]
+        places = [place for place, _ in self.speed_steps]
         marks = [low, *sorted({place for place in places if low < place < high}), high]
-        speeds = [(self.speed, *(pace for _, pace in self.paces))[bisect_right(places, mark)] for mark in marks[:-1]]
+        speeds = [
+            (self.speed, *(pace for _, pace in self.speed_steps))[bisect_right(places, mark)] for mark in marks[:-1]
+        ]
         lengths = [b - a for a, b in pairwise(marks)]
         return (lengths, speeds) if s1 >= s0 else (lengths[::-1], speeds[::-1])
 

@@ -1,4 +1,4 @@
-"""Whether an arm reaches the places where a mission works: the whole container, and the stand of the probe."""
+"""Reach check of the places where a mission works: the whole container, and the stand of the probe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which robot a run was made with: the name and the digest of its numbers, and the refusal of another one."""
+"""Identity of a run's robot: its name, the digest of its numbers, and the refusal of another one."""
 
 from __future__ import annotations
 

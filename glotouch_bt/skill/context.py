@@ -23,7 +23,7 @@ MAX_BRAKING_PERIODS = 300
 
 
 class Journal(Protocol):
-    """Where skills write events; the runner's record implements it."""
+    """Receiver of the events that skills write; the runner's record implements it."""
 
     def event(self, kind: str, stamp_s: float, data: Mapping[str, object]) -> None:
         """Record one event: `kind` (contact, candidate, touchset, ranking, ...) with JSON-able data or arrays."""

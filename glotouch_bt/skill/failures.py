@@ -1,4 +1,4 @@
-"""Why a skill fails: its declared failures, the reason that a run gives, and the failures that any skill can have."""
+"""Failures of skills: the declared failures, the reason that a run gives, and the failures that any skill can have."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from glotouch_bt.robot import GlotouchError
 
 @dataclass(frozen=True)
 class Reason:
-    """Why a node failed.
+    """Reason of a node's failure.
 
     Attributes:
         code: Short stable word, e.g. ``search_exhausted``.

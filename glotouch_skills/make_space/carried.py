@@ -1,4 +1,4 @@
-"""Where an object stands after it was grasped, carried and released. Planar, in K."""
+"""Pose of an object after it was grasped, carried and released. Planar, in K."""
 
 from __future__ import annotations
 

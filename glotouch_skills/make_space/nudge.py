@@ -10,7 +10,7 @@ from glotouch_bt.motion import FREE_M_S, Motion, hand_pose_B
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import HOLD, MotionRefused, Pose
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, In, Out, Skill, SkillParams, SkillRun, param
-from glotouch_skills.common.hand import glide, keeping_clear_of, rise_clear, unfelt_paces
+from glotouch_skills.common.hand import glide, keeping_clear_of, rise_clear, unfelt_speed_steps
 from glotouch_skills.common.planning import NEEDED_M, Push, PushPlanner, after_push, push_cost_m
 from glotouch_skills.make_space.centring import CENTRED_SD_M, centred
 from glotouch_skills.make_space.push_guard import STABLE, TOUCHING_N, Felt, PushGuard, push_guard, standing_force_B_N
@@ -250,8 +250,8 @@ class Nudge(Skill):
             yield from arm.transit(high, height_B_m=float(high.position_m[2]), speed_m_s=p.travel_speed_m_s)
             free_B_N = yield from standing_force_B_N(arm)
             height = float(container.pose_B_K.inverse().apply(high.position_m)[2]) - tips
-            paces = unfelt_paces(height, top_m, p.descent_speed_m_s)
-            reached = yield from glide(self.context, low, FREE_M_S, paces, BUMP_N)
+            speed_steps = unfelt_speed_steps(height, top_m, p.descent_speed_m_s)
+            reached = yield from glide(self.context, low, FREE_M_S, speed_steps, BUMP_N)
         behind, ahead = moving.span_m(push.yaw_K_rad)
         may_topple = 0.5 * (ahead - behind) < STABLE * moving.height_m
         along_B = container.pose_B_K.rotation @ np.array([*push.along_K, 0.0])

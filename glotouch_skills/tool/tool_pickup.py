@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import Motion, Paces, yaw_near_home
+from glotouch_bt.motion import Motion, SpeedSteps, yaw_near_home
 from glotouch_bt.perception.touch.calibration import JawZero, measured_zero
 from glotouch_bt.robot import MotionRefused, Pose, SetPayload, Tare
 from glotouch_bt.skill import MOTION_REFUSED, UNCHANGED, Failure, Out, Skill, SkillParams, SkillRun, param
@@ -257,8 +257,10 @@ class ToolPickup(Skill):
             if up <= 1e-4:
                 return
             guard = yield from straight_guard(arm, UP_B, MAX_PULL_FORCE_N)
-            paces = self._paces(out, out - 2.0 * world.holder.half_m[2])
-            moved = yield from arm.shift(up * UP_B, self.params.speed_m_s, check=False, paces=paces, guard=guard)
+            speed_steps = self._speed_steps(out, out - 2.0 * world.holder.half_m[2])
+            moved = yield from arm.shift(
+                up * UP_B, self.params.speed_m_s, check=False, speed_steps=speed_steps, guard=guard
+            )
             why = describe_stop(moved)
             if why is None:
                 return
@@ -269,7 +271,7 @@ class ToolPickup(Skill):
             yield from arm.shift(aside, GIVE_WAY_M_S, check=False)
         raise self.HARD_CONTACT(f"the probe does not come out of its holder: {why}", travelled_m=moved.travelled_m)
 
-    def _paces(self, out_m: float, slot_m: float) -> Paces:
+    def _speed_steps(self, out_m: float, slot_m: float) -> SpeedSteps:
         """Return the speeds of rising by `slot_m` until the ball enters its slot, and by `out_m` until it is out."""
         speed = self.params.speed_m_s
         pull = min(speed, MAX_PULL_M_S)

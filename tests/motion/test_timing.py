@@ -47,14 +47,14 @@ def test_travel_stays_within_its_limits(length: float, v: float, a: float, j: fl
 def test_paces_hold_where_they_begin_and_are_passed_without_a_stop(
     length: float, v: float, marks: list[tuple[float, float]], a: float, j: float, backwards: bool
 ) -> None:
-    paces = tuple(sorted(marks))
-    limits = ProfileLimits(v, a, j, paces)
+    speed_steps = tuple(sorted(marks))
+    limits = ProfileLimits(v, a, j, speed_steps)
     ends = (length, 0.0) if backwards else (0.0, length)
     profile = between(*ends, limits, PERIOD)
     s = np.concatenate([[ends[0]], profile.s])
     assert (np.sign(ends[1] - ends[0]) * np.diff(s)).min() >= -1e-9
     allowed = np.full(len(profile.s), v)
-    for at, pace in paces:
+    for at, pace in speed_steps:
         allowed[profile.s > at] = pace
     assert (np.abs(profile.v) <= allowed + 1e-6).all()
     assert np.abs(profile.a).max() <= a + 1e-6

@@ -250,7 +250,7 @@ class PlanarWorld:
 
 
 def _crossing(t: Array, gap: Array) -> float | None:
-    """Where the gap (n,) first falls from above zero to zero or below, between the places t (n,); None if never."""
+    """Return the place t at which the gap (n,) first falls from above zero to zero or below; None if never."""
     falls = np.nonzero((gap[:-1] > 0.0) & (gap[1:] <= 0.0))[0]
     if len(falls) == 0:
         return None

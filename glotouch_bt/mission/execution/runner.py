@@ -85,7 +85,7 @@ def run_mission(
     on_progress: Callable[[float, RunSummary], None] | None = None,
     timeout_s: float | None = None,
     control: Control | None = None,
-    supervision: SupervisionLimits | None = None,
+    guard_limits: SupervisionLimits | None = None,
     stuck_s: float = STUCK_S,
     on_unresponsive: Callable[[SkillHung, Outcome], None] | None = None,
     checkpoints: CheckpointWriter | None = None,
@@ -105,7 +105,7 @@ def run_mission(
         on_progress: Called about twice a second of robot time with (robot time since start, summary).
         timeout_s: Longest duration on the robot clock, without pauses (default: the mission's).
         control: Source of pause and stop requests.
-        supervision: Limits of the guards.
+        guard_limits: Limits of the guards.
         stuck_s: Longest wall time of one tick and its cycle.
         on_unresponsive: Called from another thread when a tick neither returns nor can be interrupted. It should save
             what it can and end the process.
@@ -114,7 +114,7 @@ def run_mission(
     """
     summary = RunSummary(record)
     with _device_errors():
-        supervisor = Supervisor(robot, supervision)
+        supervisor = Supervisor(robot, guard_limits)
     supervisor.on_finding = lambda finding: _record_finding(summary, finding)
     arm = make_arm(supervisor, mission.world)
     with _device_errors():

@@ -1,4 +1,4 @@
-"""Which touch comes next, and when enough is known: pure functions of the belief.
+"""Choice of the next touch, and the rule that ends touching: pure functions of the belief.
 
 Every touch is worth its expected information gain about which candidate is the target, per second of robot time. The
 probe measures a candidate's outline and top before the jaws close on it. A candidate that outline and height exclude

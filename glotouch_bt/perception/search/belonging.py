@@ -1,4 +1,4 @@
-"""Whether a contact or a trace belongs to a candidate."""
+"""Assignment of contacts and traces to candidates."""
 
 from __future__ import annotations
 

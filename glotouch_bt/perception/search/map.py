@@ -293,17 +293,17 @@ class SearchMap:
 
     @cached_property
     def hidden(self) -> Remaining:
-        """Where objects may still be."""
+        """Places where objects may still be."""
         return self.any_size if self.expected is None else self._remaining(self.prior)
 
     @cached_property
     def anywhere(self) -> Remaining:
-        """Where objects of the usual sizes may still be, without a gap to walls and traced objects."""
+        """Places where objects of the usual sizes may still be, without a gap to walls and traced objects."""
         return self._remaining(CROWDED)
 
     @cached_property
     def any_size(self) -> Remaining:
-        """Where objects of any size from 15 mm on may still be, without such a gap."""
+        """Places where objects of any size from 15 mm on may still be, without such a gap."""
         return self._remaining(ANY)
 
     def _remaining(self, prior: DiscPrior) -> Remaining:

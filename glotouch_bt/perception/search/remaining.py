@@ -1,4 +1,4 @@
-"""Where further objects may stand, and the probability that there are any.
+"""Places where further objects may stand, and the probability that there are any.
 
 A further object is a disc on a grid, of a few radii, each size equally likely and each place where it fits too. A disc
 that the swept path would have touched, or that overlaps a traced object, is excluded. The rest is the weight that

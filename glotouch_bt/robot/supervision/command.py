@@ -22,21 +22,21 @@ class CommandGuard:
 
     Args:
         robot: The guarded robot.
-        rules: Limits of the guards.
+        guard_limits: Limits of the guards.
         first: The newest block.
     """
 
-    def __init__(self, robot: Robot, rules: SupervisionLimits, first: Observation) -> None:
+    def __init__(self, robot: Robot, guard_limits: SupervisionLimits, first: Observation) -> None:
         self._joints, self._hand = robot.description.joints, robot.description.gripper
         self._period_s, self._speed_m_s = robot.period_s, robot.limits.tcp_speed_m_s
-        self._start_rad = rules.start_rad
+        self._start_rad = guard_limits.start_rad
         # lower, upper, largest speed, largest step in a period
         self._ranges = [
             (j.lower_rad - ROUNDING, j.upper_rad + ROUNDING, fastest, fastest * robot.period_s)
             for j in self._joints
-            for fastest in (rules.command_slack * j.velocity_rad_s,)
+            for fastest in (guard_limits.command_slack * j.velocity_rad_s,)
         ]
-        self._max_step_2 = (rules.command_slack * self._speed_m_s * robot.period_s) ** 2
+        self._max_step_2 = (guard_limits.command_slack * self._speed_m_s * robot.period_s) ** 2
         self.reset(first)
 
     def reset(self, newest: Observation) -> None:

@@ -37,37 +37,40 @@ class ReadingsGuard:
 
     Args:
         robot: The guarded robot.
-        rules: Limits of the guards.
+        guard_limits: Limits of the guards.
         first: The newest block. The first block of several samples gives the number of samples a period.
     """
 
-    def __init__(self, robot: Robot, rules: SupervisionLimits, first: Observation) -> None:
+    def __init__(self, robot: Robot, guard_limits: SupervisionLimits, first: Observation) -> None:
         limits, period_s = robot.limits, robot.period_s
-        self._rules, self._limits, self._period_s = rules, limits, period_s
+        self._guard_limits, self._limits, self._period_s = guard_limits, limits, period_s
         self._joints = robot.description.joints
-        self._transients = TransientCounter(rules)
+        self._transients = TransientCounter(guard_limits)
         self._samples = self._count(first)
         self._last_s = float(first.stamp_s[-1])
         self._late_s = (1.0 + LATE_PERIODS) * period_s
-        slack = rules.joint_slack_rad
+        slack = guard_limits.joint_slack_rad
         # Columns are joints; the last row has the limits that are not of a joint.
         self._fast_limits: Array = np.zeros((4, max(3, len(self._joints))))
         for i, j in enumerate(self._joints):
-            speed = rules.speed_slack * j.velocity_rad_s
+            speed = guard_limits.speed_slack * j.velocity_rad_s
             self._fast_limits[:3, i] = j.lower_rad - slack, j.upper_rad + slack, speed
-        self._fast_limits[3, :3] = rules.reach_m, limits.stop_force_N, limits.stop_torque_Nm
-        self._min_dot, self._min_pressing_force_2 = math.cos(0.5 * rules.following_rad), rules.touching_N**2
+        self._fast_limits[3, :3] = guard_limits.reach_m, limits.stop_force_N, limits.stop_torque_Nm
+        self._min_dot, self._min_pressing_force_2 = (
+            math.cos(0.5 * guard_limits.following_rad),
+            guard_limits.touching_N**2,
+        )
         # Recently commanded positions and quaternions of P in B, newest last; empty while the arm brakes on its own.
-        self._targets: deque[Array] = deque(maxlen=max(1, round(rules.lag_s / period_s)))
+        self._targets: deque[Array] = deque(maxlen=max(1, round(guard_limits.lag_s / period_s)))
         self._braking_from: tuple[list[float], float] | None = None  # position, largest distance from it
         self._has_velocity = False
         self._moving = False
         self._was_moving = False  # by the command before the newest: a late cycle waited with that one
         self._samples_over = 0
         self._away_m = 0.0  # of the hand from its path, in the block before
-        self._response = WristResponseGuard(robot, rules) if robot.description.wrist_feels_inertia else None
-        self._wrist = WrenchSignalGuard(period_s, rules, self._transients)
-        self._pads = TactileSignalGuard(rules, self._transients)
+        self._response = WristResponseGuard(robot, guard_limits) if robot.description.wrist_feels_inertia else None
+        self._wrist = WrenchSignalGuard(period_s, guard_limits, self._transients)
+        self._pads = TactileSignalGuard(guard_limits, self._transients)
 
     def reset(self, newest: Observation) -> None:
         """Start again from `newest`: the robot was restored to an earlier state."""
@@ -104,7 +107,7 @@ class ReadingsGuard:
         path = [t[:3].tolist() for t in self._targets]
         speed_m_s = max((math.dist(a, b) for a, b in pairwise(path)), default=0.0) / self._period_s
         braking_m = 0.5 * speed_m_s**2 / self._limits.stop_acceleration_m_s2
-        return braking_m + speed_m_s * self._rules.lag_s + self._rules.following_m
+        return braking_m + speed_m_s * self._guard_limits.lag_s + self._guard_limits.following_m
 
     def _add_stop(self) -> None:
         """Insert the place where the device came to rest when the newest command was late.
@@ -140,7 +143,9 @@ class ReadingsGuard:
         if self._response is not None:
             self._response.check(o, findings)
         jaws = o.gripper
-        if not (stamp_s - jaws.stamp_s <= self._rules.gripper_age_s and math.isfinite(jaws.aperture_m + jaws.force_N)):
+        if not (
+            stamp_s - jaws.stamp_s <= self._guard_limits.gripper_age_s and math.isfinite(jaws.aperture_m + jaws.force_N)
+        ):
             self._check_jaws(o, findings)
         if self._pads.asked:
             self._pads.check(o, findings)
@@ -185,7 +190,7 @@ class ReadingsGuard:
         if bad:
             fatal = not good.any() or self._transients.exceeded("stamps", last, bad)
             what = f"{bad} of {len(s)} samples are not later than the one before them"
-            findings.append(GuardFinding("stamps", what, float(bad), float(self._rules.tolerated), last, fatal))
+            findings.append(GuardFinding("stamps", what, float(bad), float(self._guard_limits.tolerated), last, fatal))
             if fatal:
                 return o
             o = _select(o, good)
@@ -197,17 +202,17 @@ class ReadingsGuard:
         now_s = float(o.stamp_s[-1])
         periods = (now_s - self._last_s) / self._period_s
         if periods >= 1.0 + LATE_PERIODS:
-            fatal = self._was_moving and periods > 1.0 + self._rules.late_periods
-            if not fatal and self._was_moving and periods > 1.0 + self._rules.held_periods:
+            fatal = self._was_moving and periods > 1.0 + self._guard_limits.late_periods
+            if not fatal and self._was_moving and periods > 1.0 + self._guard_limits.held_periods:
                 fatal = self._transients.exceeded("overrun", now_s)
             what = f"{periods:.1f} control periods passed in one cycle" + (" while the arm moved" * self._was_moving)
-            findings.append(GuardFinding("overrun", what, periods, 1.0 + self._rules.late_periods, now_s, fatal))
+            findings.append(GuardFinding("overrun", what, periods, 1.0 + self._guard_limits.late_periods, now_s, fatal))
         expected = round(self._samples * periods)
         missing = expected - len(o.stamp_s) - dropped
         if missing > 1 and len(o.stamp_s) < MIN_SAMPLE_SHARE * expected:
-            blind = missing / (self._samples * self._rules.late_periods) if self._was_moving else 0.0
+            blind = missing / (self._samples * self._guard_limits.late_periods) if self._was_moving else 0.0
             fatal = self._transients.exceeded(
-                "samples_missing", now_s, max(1, math.ceil(blind * self._rules.tolerated))
+                "samples_missing", now_s, max(1, math.ceil(blind * self._guard_limits.tolerated))
             )
             what = f"{missing} of {expected} samples are missing"
             most = (1.0 - MIN_SAMPLE_SHARE) * expected
@@ -225,15 +230,17 @@ class ReadingsGuard:
             names = [n for n in ("q", "dq", "wrench_S", "position_B_P", "quat_B_P")
                      if not np.isfinite(getattr(o, n)).all()]  # fmt: skip
             what = f"{bad} of {len(good)} samples are not finite ({', '.join(names)})"
-            findings.append(GuardFinding("not_finite", what, float(bad), float(self._rules.tolerated), stamp_s, fatal))
+            findings.append(
+                GuardFinding("not_finite", what, float(bad), float(self._guard_limits.tolerated), stamp_s, fatal)
+            )
             if not good.any():
                 return o
             o = _select(o, good)
         self._check_joints(o, findings)
         far = float(np.abs(o.position_B_P).max())
-        if far > self._rules.reach_m:
+        if far > self._guard_limits.reach_m:
             what = f"the pads' mid-point is reported {far:.2f} m from the base"
-            findings.append(GuardFinding("out_of_reach", what, far, self._rules.reach_m, float(o.stamp_s[-1])))
+            findings.append(GuardFinding("out_of_reach", what, far, self._guard_limits.reach_m, float(o.stamp_s[-1])))
         norm = float(np.abs((o.quat_B_P * o.quat_B_P).sum(axis=1) - 1.0).max())
         if norm > MAX_NORM_ERROR:
             what = f"the square of a reported quaternion's length is off by {norm:.3g}"
@@ -243,17 +250,21 @@ class ReadingsGuard:
         return o
 
     def _check_joints(self, o: Observation, findings: list[GuardFinding]) -> None:
-        rules, stamp_s = self._rules, float(o.stamp_s[-1])
+        guard_limits, stamp_s = self._guard_limits, float(o.stamp_s[-1])
         for i, joint in enumerate(self._joints):
             low, high = float(o.q[:, i].min()), float(o.q[:, i].max())
             value = low if joint.lower_rad - low > high - joint.upper_rad else high
             limit = joint.lower_rad if value == low else joint.upper_rad
-            if not joint.lower_rad - rules.joint_slack_rad <= value <= joint.upper_rad + rules.joint_slack_rad:
+            if (
+                not joint.lower_rad - guard_limits.joint_slack_rad
+                <= value
+                <= joint.upper_rad + guard_limits.joint_slack_rad
+            ):
                 valid = f"{joint.lower_rad:.3f}..{joint.upper_rad:.3f}"
                 what = f"{joint.name} is at {value:.3f} rad, its range is {valid}"
                 findings.append(GuardFinding("joint_range", what, value, limit, stamp_s))
             fastest = float(np.abs(o.dq[:, i]).max())
-            if fastest > rules.speed_slack * joint.velocity_rad_s:
+            if fastest > guard_limits.speed_slack * joint.velocity_rad_s:
                 what = f"{joint.name} turns at {fastest:.2f} rad/s, its limit is {joint.velocity_rad_s:.2f}"
                 findings.append(GuardFinding("joint_speed", what, fastest, joint.velocity_rad_s, stamp_s))
 
@@ -262,7 +273,12 @@ class ReadingsGuard:
 
         The joints are not compared: a device that is sent poses chooses its own posture for them.
         """
-        rules, p, q, now_s = self._rules, o.position_B_P[-1].tolist(), o.quat_B_P[-1].tolist(), float(o.stamp_s[-1])
+        guard_limits, p, q, now_s = (
+            self._guard_limits,
+            o.position_B_P[-1].tolist(),
+            o.quat_B_P[-1].tolist(),
+            float(o.stamp_s[-1]),
+        )
         if self._braking_from is not None:
             start, max_m = self._braking_from
             if (away_m := math.dist(p, start)) > max_m:
@@ -272,16 +288,16 @@ class ReadingsGuard:
         if not self._targets:
             return
         periods = max(1.0, (now_s - self._last_s) / self._period_s)
-        if self._was_moving and periods > 1.0 + rules.held_periods:
+        if self._was_moving and periods > 1.0 + guard_limits.held_periods:
             self._add_stop()
         recent = [t.tolist() for t in self._targets]
         away_m, before_m = distance_to_path(p, [t[:3] for t in recent]), self._away_m
         self._away_m = away_m
         touches = self._pressing(o)
-        max_m = min(rules.touching_m, rules.following_m) if touches else rules.following_m
+        max_m = min(guard_limits.touching_m, guard_limits.following_m) if touches else guard_limits.following_m
         told = "told to " + ("be" if self._moving else "stay")
         leaving_m = max(away_m - before_m, 0.0) / periods
-        soon_m = away_m + rules.following_periods * leaving_m
+        soon_m = away_m + guard_limits.following_periods * leaving_m
         if soon_m > max_m:
             what = f"the hand is {away_m * 1e3:.1f} mm from where it was {told}"
             if away_m <= max_m:
@@ -291,11 +307,10 @@ class ReadingsGuard:
                 what += f" while it presses with {float(np.linalg.norm(o.wrench_S[-1, :3])):.0f} N"
             findings.append(GuardFinding("following", what, soon_m, max_m, now_s))
         rad = min(angle_rad(q, t[3:]) for t in recent)
-        if rad > rules.following_rad:
-            what = (
-                f"the hand is turned by {rad:.3f} rad from how it was {told}; {rules.following_rad:.3f} rad are allowed"
-            )
-            findings.append(GuardFinding("following", what, rad, rules.following_rad, now_s))
+        if rad > guard_limits.following_rad:
+            allowed = f"{guard_limits.following_rad:.3f} rad are allowed"
+            what = f"the hand is turned by {rad:.3f} rad from how it was {told}; {allowed}"
+            findings.append(GuardFinding("following", what, rad, guard_limits.following_rad, now_s))
 
     def _check_wrench(self, o: Observation, findings: list[GuardFinding]) -> None:
         """Count consecutive samples beyond the stop limit, also across blocks."""
@@ -305,7 +320,7 @@ class ReadingsGuard:
         beyond = (force > max_N) | (torque > max_Nm)
         for i, over in enumerate(beyond.tolist()):
             self._samples_over = self._samples_over + 1 if over else 0
-            if self._samples_over < self._rules.wrench_samples:
+            if self._samples_over < self._guard_limits.wrench_samples:
                 continue
             by_force = force[i] / max_N >= torque[i] / max_Nm
             value, limit, unit = (float(force[i]), max_N, "N") if by_force else (float(torque[i]), max_Nm, "Nm")
@@ -315,10 +330,10 @@ class ReadingsGuard:
             return
 
     def _check_jaws(self, o: Observation, findings: list[GuardFinding]) -> None:
-        jaws, now_s, limit = o.gripper, float(o.stamp_s[-1]), self._rules.gripper_age_s
+        jaws, now_s, limit = o.gripper, float(o.stamp_s[-1]), self._guard_limits.gripper_age_s
         if not math.isfinite(jaws.aperture_m + jaws.force_N + jaws.stamp_s):
             what = f"the gripper reports {jaws.aperture_m} m, {jaws.force_N} N at {jaws.stamp_s} s"
-            fatal = self._transients.exceeded("not_finite", now_s, self._rules.tolerated + 1)
+            fatal = self._transients.exceeded("not_finite", now_s, self._guard_limits.tolerated + 1)
             findings.append(GuardFinding("not_finite", what, math.nan, limit, now_s, fatal))
             return
         age = now_s - jaws.stamp_s

@@ -101,14 +101,14 @@ class WristResponseGuard:
 
     Args:
         robot: The guarded robot.
-        rules: Limits of the guards.
+        guard_limits: Limits of the guards.
     """
 
-    def __init__(self, robot: Robot, rules: SupervisionLimits) -> None:
+    def __init__(self, robot: Robot, guard_limits: SupervisionLimits) -> None:
         gripper = robot.description.gripper
         self._mass_kg, com_E = gripper.mass_and_com_E()
         self._com_P = gripper.pose_E_P.inverse().apply(com_E)
-        self._rules, self._max_gap_s = rules, MAX_GAP_PERIODS * robot.period_s
+        self._guard_limits, self._max_gap_s = guard_limits, MAX_GAP_PERIODS * robot.period_s
         self.reset()
 
     def reset(self) -> None:
@@ -141,14 +141,14 @@ class WristResponseGuard:
         change = self._force - self._rest
         self._due += inertia_N**2
         self._felt += float(change @ change)
-        if self._due >= self._rules.proof_N2:
-            if self._felt < self._rules.silent_share * self._due:
+        if self._due >= self._guard_limits.proof_N2:
+            if self._felt < self._guard_limits.silent_share * self._due:
                 self._report(stamp_s, findings)
             self._due = self._felt = 0.0
 
     def _report(self, stamp_s: float, findings: list[GuardFinding]) -> None:
         share = (self._felt / self._due) ** 0.5
-        limit = self._rules.silent_share**0.5
+        limit = self._guard_limits.silent_share**0.5
         what = (
             f"the wrist shows {100.0 * share:.0f} % of the hand's inertia, at least {100.0 * limit:.0f} % are "
             "expected: the force sensor is dead, or its samples come late"

@@ -38,9 +38,9 @@ def _repeats(w: Array) -> tuple[bool, float]:
 class WrenchSignalGuard:
     """Check the noise of the wrist force sensor once a period."""
 
-    def __init__(self, period_s: float, rules: SupervisionLimits, transients: TransientCounter) -> None:
-        self._period_s, self._rules, self._transients = period_s, rules, transients
-        self._share = period_s / rules.noise_over_s
+    def __init__(self, period_s: float, guard_limits: SupervisionLimits, transients: TransientCounter) -> None:
+        self._period_s, self._guard_limits, self._transients = period_s, guard_limits, transients
+        self._share = period_s / guard_limits.noise_over_s
         self._noted_s = -np.inf
         self.reset()
 
@@ -60,21 +60,21 @@ class WrenchSignalGuard:
             if not self._noisy:
                 self._noisy_periods = self._noisy_periods + 1 if self._restless(w) else 0
         self._noise_N += self._share * (step - self._noise_N)
-        if self._noise_N > self._rules.max_noise_N:
+        if self._noise_N > self._guard_limits.max_noise_N:
             self._record_noise(o.now_s, findings)
 
     @property
     def _noisy(self) -> bool:
-        return self._noisy_periods * self._period_s >= self._rules.noisy_s
+        return self._noisy_periods * self._period_s >= self._guard_limits.noisy_s
 
     def _restless(self, w: Array) -> bool:
         """Return True if the force goes up and down within a block, as noise does and a motion does not."""
         steps = np.diff(w[:, 0])
-        steps = steps[np.abs(steps) > self._rules.noise_N]
+        steps = steps[np.abs(steps) > self._guard_limits.noise_N]
         return bool(np.count_nonzero(steps[1:] * steps[:-1] < 0.0) >= MIN_TURNS)
 
     def _check_stuck(self, w: Array, stamp_s: float, findings: list[GuardFinding]) -> None:
-        rules = self._rules
+        guard_limits = self._guard_limits
         constant = (w == w[-1]).all(axis=0)
         if not constant.any():
             return
@@ -89,18 +89,18 @@ class WrenchSignalGuard:
         self._same_periods += 1
         same_s = self._same_periods * self._period_s
         if noisy:
-            fatal = self._transients.exceeded("wrench_stuck", stamp_s) or same_s >= rules.stuck_s
+            fatal = self._transients.exceeded("wrench_stuck", stamp_s) or same_s >= guard_limits.stuck_s
             what = f"the wrench has been bit-identical for {same_s:.2f} s; it was noisy before"
-            findings.append(GuardFinding("wrench_stuck", what, same_s, rules.stuck_s, stamp_s, fatal))
-        elif same_s >= rules.stuck_s:
+            findings.append(GuardFinding("wrench_stuck", what, same_s, guard_limits.stuck_s, stamp_s, fatal))
+        elif same_s >= guard_limits.stuck_s:
             self._noisy_periods = 0
 
     def _record_noise(self, stamp_s: float, findings: list[GuardFinding]) -> None:
         """Record noise once a window; it never ends a mission, because a skill notices when it cannot work with it."""
-        if stamp_s - self._noted_s < self._rules.window_s:
+        if stamp_s - self._noted_s < self._guard_limits.window_s:
             return
         self._noted_s = stamp_s
-        limit = self._rules.max_noise_N
+        limit = self._guard_limits.max_noise_N
         what = f"the force jumps by {self._noise_N:.2f} N from sample to sample; at most {limit:.2f} N are expected"
         findings.append(GuardFinding("wrench_noise", what, self._noise_N, limit, stamp_s, fatal=False))
 
@@ -108,8 +108,8 @@ class WrenchSignalGuard:
 class TactileSignalGuard:
     """Check the depth maps while they are requested."""
 
-    def __init__(self, rules: SupervisionLimits, transients: TransientCounter) -> None:
-        self._rules, self._transients = rules, transients
+    def __init__(self, guard_limits: SupervisionLimits, transients: TransientCounter) -> None:
+        self._guard_limits, self._transients = guard_limits, transients
         self.reset()
 
     def reset(self) -> None:
@@ -132,7 +132,7 @@ class TactileSignalGuard:
 
     def check(self, o: Observation, findings: list[GuardFinding]) -> None:
         """Check one block."""
-        now_s, limit, frame = o.now_s, self._rules.tactile_age_s, o.tactile
+        now_s, limit, frame = o.now_s, self._guard_limits.tactile_age_s, o.tactile
         since_s = now_s if self._since_s is None else self._since_s
         if frame is None or frame.stamp_s < since_s - limit:  # also one taken before the request
             waited = now_s - since_s
@@ -150,10 +150,10 @@ class TactileSignalGuard:
     def _check_dead(self, frame: TactileFrame, now_s: float, findings: list[GuardFinding]) -> None:
         for side, depth in (("left", frame.left_m), ("right", frame.right_m)):
             live = float(np.count_nonzero(np.isfinite(depth))) / depth.size
-            if live < self._rules.live_taxels or np.isinf(depth).any():
+            if live < self._guard_limits.live_taxels or np.isinf(depth).any():
                 fatal = self._transients.exceeded("tactile_dead", now_s)
                 what = f"{100.0 * live:.0f} % of the {side} pad deliver numbers"
-                findings.append(GuardFinding("tactile_dead", what, live, self._rules.live_taxels, now_s, fatal))
+                findings.append(GuardFinding("tactile_dead", what, live, self._guard_limits.live_taxels, now_s, fatal))
 
     def _check_frozen(self, frame: TactileFrame, untouched: bool, now_s: float, findings: list[GuardFinding]) -> None:
         last, self._last = self._last, frame

@@ -29,17 +29,17 @@ class Supervisor(Robot):
 
     Args:
         robot: Any robot.
-        rules: Limits of the guards.
+        guard_limits: Limits of the guards.
 
     Attributes:
         on_finding: Called with every recorded finding (the first `MAX_RECORDED` of each guard); set by the recorder.
         counts: Number of findings by guard, recorded or not.
     """
 
-    def __init__(self, robot: Robot, rules: SupervisionLimits | None = None) -> None:
+    def __init__(self, robot: Robot, guard_limits: SupervisionLimits | None = None) -> None:
         self._robot = robot
         self.description, self.limits, self.period_s = robot.description, robot.limits, robot.period_s
-        self.guard_limits = SupervisionLimits() if rules is None else rules
+        self.guard_limits = SupervisionLimits() if guard_limits is None else guard_limits
         self.on_finding: Callable[[GuardFinding], None] = lambda _: None
         self.counts: dict[str, int] = {}
         self._lock = threading.RLock()

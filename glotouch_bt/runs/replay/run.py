@@ -126,7 +126,7 @@ def _replay(
             on_progress(seconds, last_s - first_s)
 
     pauses = TimedPauses(_pauses(record))
-    outcome = run_mission(mission, robot, log, on_progress=progress, control=pauses, supervision=NO_LIMITS)
+    outcome = run_mission(mission, robot, log, on_progress=progress, control=pauses, guard_limits=NO_LIMITS)
     ended = isinstance(outcome.error, RecordEnded)
     then_events, now_events = (
         [e for e in events if e.kind not in EXTERNAL_EVENTS] for events in (record.events, log.events)

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from glotouch_bt.motion import FREE_M_S, Motion, MoveResult, Paces
+from glotouch_bt.motion import FREE_M_S, Motion, MoveResult, SpeedSteps
 from glotouch_bt.perception.touch import (
     Baseline,
     Contact,
@@ -155,9 +155,9 @@ class Prober:
         return bool((change <= np.maximum(noise, SAME_SHARE * threshold)).all())
 
     def move(
-        self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False, paces: Paces = ()
+        self, tip_K_m: Array, speed_m_s: float, *, any_direction: bool = False, speed_steps: SpeedSteps = ()
     ) -> Motion[Probed]:
-        """Move the ball straight to `tip_K_m` (3,) under a guard; `paces` as in `Arm.follow`.
+        """Move the ball straight to `tip_K_m` (3,) under a guard; `speed_steps` as in `Arm.follow`.
 
         Stop at the first contact that opposes the motion or, with `any_direction`, at any contact, even a graze.
 
@@ -176,7 +176,7 @@ class Prober:
             speed_m_s,
             acceleration_m_s2=GUARDED_ACCELERATION_M_S2,
             jerk_m_s3=GUARDED_JERK_M_S3,
-            paces=paces,
+            speed_steps=speed_steps,
             guard=guard,
         )
         self._last_guard = guard

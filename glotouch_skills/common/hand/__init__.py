@@ -2,7 +2,7 @@
 
 from glotouch_skills.common.hand.clearance_rules import keeping_clear_of, may_touch, neighbours
 from glotouch_skills.common.hand.compliant_close import close_compliantly, release
-from glotouch_skills.common.hand.descent import descend, descent_paces, seconds_at, unfelt_paces
+from glotouch_skills.common.hand.descent import descend, descent_speed_steps, seconds_at, unfelt_speed_steps
 from glotouch_skills.common.hand.fingertips import fingertips_K_m, inner_edges, rise_from_met
 from glotouch_skills.common.hand.hand import CLEARANCE_M, NoSpace, glide, require_clear
 from glotouch_skills.common.hand.line_guard import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.motion import FREE_M_S, Arm, FeltSpace, Motion, Paces
+from glotouch_bt.motion import FREE_M_S, Arm, FeltSpace, Motion, SpeedSteps
 from glotouch_bt.robot import Array, Pose
 from glotouch_bt.skill import Context
 from glotouch_skills.common.hand.fingertips import fingertips_K_m, inner_edges
@@ -45,8 +45,8 @@ def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, sl
     """
     arm = context.arm
     edges = _edges_under(arm, goal_B_P, opening_m)
-    paces = descent_paces(arm.felt, edges, fingertips_K_m(arm, arm.pose_B_P), top_m, slow_m_s)
-    reached = yield from glide(context, goal_B_P, FREE_M_S, paces)
+    speed_steps = descent_speed_steps(arm.felt, edges, fingertips_K_m(arm, arm.pose_B_P), top_m, slow_m_s)
+    reached = yield from glide(context, goal_B_P, FREE_M_S, speed_steps)
     if reached:
         note_open_fingers(arm)
     else:
@@ -54,7 +54,9 @@ def descend(context: Context, goal_B_P: Pose, opening_m: float, top_m: float, sl
     return reached
 
 
-def descent_paces(felt: FeltSpace, edges_K_m: Array, tips_K_m: float, top_m: float, slow_m_s: float) -> Paces:
+def descent_speed_steps(
+    felt: FeltSpace, edges_K_m: Array, tips_K_m: float, top_m: float, slow_m_s: float
+) -> SpeedSteps:
     """Return the speeds of a descent of the fingertips, each from a distance below `tips_K_m` on.
 
     Args:
@@ -65,20 +67,20 @@ def descent_paces(felt: FeltSpace, edges_K_m: Array, tips_K_m: float, top_m: flo
     """
     free_m = felt.free_down_to(edges_K_m, FELT_WITHIN_M)
     if not np.isfinite(free_m):
-        return unfelt_paces(tips_K_m, top_m, slow_m_s)
+        return unfelt_speed_steps(tips_K_m, top_m, slow_m_s)
     beside = max(tips_K_m - top_m - OVER_TOP_M, 0.0)
     return (0.0, FREE_M_S), (beside, BESIDE_M_S), (max(tips_K_m - max(free_m, FOOT_M), beside), slow_m_s)
 
 
-def unfelt_paces(tips_K_m: float, top_m: float, slow_m_s: float) -> Paces:
-    """Return the speeds, as `descent_paces`, where nothing was felt."""
+def unfelt_speed_steps(tips_K_m: float, top_m: float, slow_m_s: float) -> SpeedSteps:
+    """Return the speeds, as `descent_speed_steps`, where nothing was felt."""
     return (0.0, ABOVE_RATIO * slow_m_s), (max(tips_K_m - top_m - OVER_TOP_M, 0.0), slow_m_s)
 
 
-def seconds_at(paces: Paces, length_m: float) -> float:
+def seconds_at(speed_steps: SpeedSteps, length_m: float) -> float:
     """Return the time of a straight way at the given speeds, without starting and stopping."""
-    ends = [min(begin, length_m) for begin, _ in paces[1:]] + [length_m]
-    return sum(max(end - begin, 0.0) / speed for (begin, speed), end in zip(paces, ends, strict=True))
+    ends = [min(begin, length_m) for begin, _ in speed_steps[1:]] + [length_m]
+    return sum(max(end - begin, 0.0) / speed for (begin, speed), end in zip(speed_steps, ends, strict=True))
 
 
 def note_open_fingers(arm: Arm) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from glotouch_bt.motion import Arm, Motion, Paces
+from glotouch_bt.motion import Arm, Motion, SpeedSteps
 from glotouch_bt.perception.touch import ContactGuard, GuardParams, fit_baseline
 from glotouch_bt.robot import MotionRefused, Pose
 from glotouch_bt.skill import Context
@@ -50,12 +50,12 @@ def require_clear(arm: Arm, pose_B_P: Pose, aperture_m: float, margin_m: float |
 
 
 def glide(
-    context: Context, pose_B_P: Pose, speed_m_s: float, paces: Paces = (), bump_N: float = BUMP_N
+    context: Context, pose_B_P: Pose, speed_m_s: float, speed_steps: SpeedSteps = (), bump_N: float = BUMP_N
 ) -> Motion[bool]:
     """Move straight to a pose among objects and stop if the fingers touch one; return True if the pose was reached.
 
-    The orientation must be the present one. The hand stops within 1 to 2 mm of the touch. `paces` as in `Arm.follow`.
-    `bump_N` is the force that counts as a touch.
+    The orientation must be the present one. The hand stops within 1 to 2 mm of the touch. `speed_steps` as in
+    `Arm.follow`. `bump_N` is the force that counts as a touch.
 
     Raises:
         MotionRefused: Before moving.
@@ -79,7 +79,7 @@ def glide(
         speed_m_s,
         acceleration_m_s2=GLIDE_ACCELERATION_M_S2,
         jerk_m_s3=GLIDE_JERK_M_S3,
-        paces=paces,
+        speed_steps=speed_steps,
         guard=guard,
     )
     return result.stop is None

@@ -50,7 +50,7 @@ ROUNDING_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class FreePlace:
-    """Where to set an object down: a turn about its outline's centre, then a displacement.
+    """Place to set an object down: a turn about its outline's centre, then a displacement.
 
     Attributes:
         candidate: Index of the object.

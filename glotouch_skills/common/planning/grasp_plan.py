@@ -160,7 +160,7 @@ def _placed(point_O_m: Array, match: Match) -> Array:
 
 @dataclass(frozen=True)
 class _Hold:
-    """Where the pads would hold the model, and how far they open: angles and lengths as in `TargetModel`."""
+    """Places where the pads would hold the model, and their opening: angles and lengths as in `TargetModel`."""
 
     phi_rad: float
     along_m: float

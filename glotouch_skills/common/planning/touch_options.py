@@ -11,7 +11,7 @@ from glotouch_bt.motion import FeltSpace
 from glotouch_bt.perception.recognition import Closure
 from glotouch_bt.perception.touch import Candidate, TouchSet
 from glotouch_bt.robot import Array, Gripper, Pose
-from glotouch_skills.common.hand import descent_paces, inner_edges, seconds_at
+from glotouch_skills.common.hand import descent_speed_steps, inner_edges, seconds_at
 from glotouch_skills.common.planning.squeeze_motion import FAST_RISE_RATIO, ClosureParams, layer_heights
 from glotouch_skills.common.planning.squeeze_plan import Stance, schemes, stance
 
@@ -184,6 +184,6 @@ def _travel_s(
     across = float(np.linalg.norm(at.position_K_m - hand_K_m[:2]))
     up = abs(p.headroom_m + below - float(hand_K_m[2]))
     edges = inner_edges(gripper, Pose.pointing_down(np.array([*at.position_K_m, height_m]), at.yaw_K_rad), at.opening_m)
-    paces = descent_paces(felt, edges, p.headroom_m, candidate.height_m, p.descent_speed_m_s)
-    down_s = seconds_at(paces, p.headroom_m + below - height_m)
+    speed_steps = descent_speed_steps(felt, edges, p.headroom_m, candidate.height_m, p.descent_speed_m_s)
+    down_s = seconds_at(speed_steps, p.headroom_m + below - height_m)
     return (up + across) / p.travel_speed_m_s + down_s + TURN_S + 4 * STOP_S

@@ -59,7 +59,7 @@ def feel_floor(
     yield from prober.hop(np.array([*corner, 0.0]), max(rim + 0.06, float(prober.tip_K_m[2])), speed_m_s)
     high, floor = float(prober.tip_K_m[2]), tool.floor_z_K_m
     inside_m_s = GUARDED_M_S if slowly else min(speed_m_s, FREE_M_S)
-    paces = (
+    speed_steps = (
         (0.0 if slowly else high - rim - RIM_M, GUARDED_M_S),
         (high - rim + RIM_M, inside_m_s),
         (high - floor - GUARDED_FROM_M, GUARDED_M_S),
@@ -67,7 +67,7 @@ def feel_floor(
     )
     with may_touch(arm, "tool", "floor", "table"):  # the table is under the floor: nothing reaches it
         lowest = np.array([*corner, floor + tool.tip_radius_m - FLOOR_SEARCH_M])
-        probed = yield from prober.move(lowest, speed_m_s, paces=paces)
+        probed = yield from prober.move(lowest, speed_m_s, speed_steps=speed_steps)
         if probed.contact is None:
             return None
         yield from prober.retreat(np.array([0.0, 0.0, 1.0]), RETREAT_M, RETREAT_M_S)

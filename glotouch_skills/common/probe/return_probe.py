@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from glotouch_bt.motion import FREE_M_S, Motion, MoveResult, Paces
+from glotouch_bt.motion import FREE_M_S, Motion, MoveResult, SpeedSteps
 from glotouch_bt.robot import Array, MotionRefused, Observation, Pose
 from glotouch_bt.skill import Context, Failure, SkillRun
 from glotouch_skills.common.hand import (
@@ -132,14 +132,14 @@ def return_probe(
         near = dataclasses.replace(grasp, position_m=grasp.position_m + beside + np.array([0.0, 0.0, high_m]))
         if float(arm.pose_B_P.position_m[2]) > float(near.position_m[2]):
             outside = float(arm.pose_B_P.position_m[2] - grasp.position_m[2]) - world.probe.length_m - ENTRY_M
-            paces = ((0.0, max(FREE_M_S, insert_speed_m_s)), (max(outside, 0.0), insert_speed_m_s))
-            moved = yield from _lower(context, near, paces, aperture_m, MAX_INSERT_FORCE_N)
+            speed_steps = ((0.0, max(FREE_M_S, insert_speed_m_s)), (max(outside, 0.0), insert_speed_m_s))
+            moved = yield from _lower(context, near, speed_steps, aperture_m, MAX_INSERT_FORCE_N)
             if (why := describe_stop(moved)) is not None:
                 yield from _rise(context, insert_speed_m_s)  # do not keep pressing on the holder
                 raise MotionRefused("into the holder", why)
     left = float(np.linalg.norm(arm.pose_B_P.position_m - grasp.position_m))
-    paces = ((0.0, min(SLOW_M_S, insert_speed_m_s)), (left - SEAT_M, min(SEAT_M_S, insert_speed_m_s)))
-    moved = yield from _lower(context, grasp, paces, aperture_m, MAX_INSERT_FORCE_N)
+    speed_steps = ((0.0, min(SLOW_M_S, insert_speed_m_s)), (left - SEAT_M, min(SEAT_M_S, insert_speed_m_s)))
+    moved = yield from _lower(context, grasp, speed_steps, aperture_m, MAX_INSERT_FORCE_N)
     why = describe_stop(moved)
     if isinstance(moved.stop, Strayed):
         yield from _rise(context, insert_speed_m_s)
@@ -161,8 +161,10 @@ def _aside_m(ball_B_m: Array) -> Array:
     return np.zeros(3) if off < CENTRED_M else -ball_B_m * min(1.0, MAX_ASIDE_M / off)
 
 
-def _lower(context: Context, goal: Pose, paces: Paces, aperture_m: float, max_N: float) -> Motion[MoveResult]:
-    """Move straight to `goal`, until the force changes by more than `max_N`; `paces` begin at 0.
+def _lower(
+    context: Context, goal: Pose, speed_steps: SpeedSteps, aperture_m: float, max_N: float
+) -> Motion[MoveResult]:
+    """Move straight to `goal`, until the force changes by more than `max_N`; `speed_steps` begin at 0.
 
     Raises:
         SkillFailed: `tool_lost`; the hand has risen again.
@@ -172,13 +174,13 @@ def _lower(context: Context, goal: Pose, paces: Paces, aperture_m: float, max_N:
     straight = yield from straight_guard(arm, way if way.any() else DOWN_B, max_N)
     released = not arm.scene.holding_tool or np.linalg.norm(goal.position_m - arm.pose_B_P.position_m) < IN_PLACE_M
     guard = straight if released else Lowering(straight, aperture_m)  # released before a preemption
-    moved = yield from arm.line(goal, paces[0][1], check=False, paces=paces, guard=guard)
+    moved = yield from arm.line(goal, speed_steps[0][1], check=False, speed_steps=speed_steps, guard=guard)
     if not isinstance(moved.stop, Dropped):
         return moved
     arm.scene.hold_tool(False)
     arm.tool_seat.released()
     arm.felt.forget()
-    yield from _rise(context, paces[-1][1])
+    yield from _rise(context, speed_steps[-1][1])
     raise TOOL_LOST(
         f"the probe was dropped on its way into the holder: {moved.stop}",
         aperture_m=moved.stop.apart_m,

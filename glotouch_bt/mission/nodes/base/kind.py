@@ -36,7 +36,7 @@ class NodeReader(Protocol):
 
     @property
     def findings(self) -> Findings:
-        """Where faults go."""
+        """Collection of the findings."""
 
     def wire(self, port: str, key: str, place: Place) -> Wire | None:
         """Return a port wired to a key; None (and a finding) if that is not a key."""

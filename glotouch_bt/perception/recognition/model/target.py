@@ -50,7 +50,7 @@ class TargetHypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """How well the tables, each (72, nl, nz), and the height of an object known only by touch are known.
+    """Uncertainty of the tables, each (72, nl, nz), and of the height of an object known only by touch.
 
     Attributes:
         width_sd_m: Standard deviation of the width, besides that of a measurement.
@@ -130,7 +130,7 @@ class TargetModel:
 
     @cached_property
     def hypotheses(self) -> tuple[TargetHypothesis, ...]:
-        """How the object may stand and what the probe may have traced of it; the weights sum to 1."""
+        """Hypotheses of the pose of the object and of the part that the probe traced; the weights sum to 1."""
         found: list[TargetHypothesis] = []
         for side in self.sides or (TargetHypothesis(self, UPRIGHT, 1.0),):
             model, components = side.model, side.model.components

@@ -70,9 +70,9 @@ def fit_widths(model: TargetModel, seen: PaperObservation, p: PaperParams) -> Wi
     strength = p.scale_prior * (1 + p.scale_anisotropy * model.anisotropy)
     prior = np.asarray(strength * np.abs(np.log(grid.scale_of_each)), dtype=np.float32)
     cross = cross_sums(readings, residuals, p) if p.w_cross > 0 else None
-    coupled = _least(joined(sums, cross), readings, residuals, prior, tie, grid, p)
+    coupled = _min_loss(joined(sums, cross), readings, residuals, prior, tie, grid, p)
     independent = tuple(
-        _least(u, [s], [r], prior, tie, grid, p) for u, s, r in zip(sums, readings, residuals, strict=True)
+        _min_loss(u, [s], [r], prior, tie, grid, p) for u, s, r in zip(sums, readings, residuals, strict=True)
     )
     separate = float(np.median([f.loss for f in independent]))
     share = {"mixed": seen.p_coupled, "coupled": 1.0, "independent": 0.0}[p.branch]
@@ -86,7 +86,7 @@ def bias_grid(limit_m: float, step_m: float) -> Array:
     return np.linspace(-limit_m, limit_m, 2 * n + 1) if n else np.zeros(1)
 
 
-def _least(
+def _min_loss(
     sums: Sums, readings: Sequence[SequenceReading], residuals: Sequence[Array32], prior: Array32, tie: Array32,
     grid: Hypotheses,     p: PaperParams,
 ) -> BranchFit:  # fmt: skip

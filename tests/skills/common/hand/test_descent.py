@@ -38,6 +38,6 @@ def test_unknown_space_is_entered_slowly_and_felt_space_fast(bench) -> None:
 
 def test_the_time_of_a_way_at_several_speeds() -> None:
     """0.1 m at 0.1 m/s, then 0.05 m at 0.01 m/s."""
-    paces = ((0.0, 0.1), (0.1, 0.01))
-    assert seconds_at(paces, 0.15) == pytest.approx(6.0)
-    assert seconds_at(paces, 0.05) == pytest.approx(0.5)
+    speed_steps = ((0.0, 0.1), (0.1, 0.01))
+    assert seconds_at(speed_steps, 0.15) == pytest.approx(6.0)
+    assert seconds_at(speed_steps, 0.05) == pytest.approx(0.5)
