@@ -12,7 +12,7 @@ from glotouch_bt.perception.search.candidates import (
 )
 from glotouch_bt.perception.search.exploring import seek_next, trace_bodies
 from glotouch_bt.perception.search.map import LEFT_BELOW, SearchMap
-from glotouch_bt.perception.search.moves import Move, MoveKind, MoveOutcome, SearchPlan, T
+from glotouch_bt.perception.search.moves import Move, MoveKind, MoveOutcome, SearchPlan
 from glotouch_bt.perception.search.policies import (
     POLICIES,
     ExpectationParams,

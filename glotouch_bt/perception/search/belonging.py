@@ -5,21 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from glotouch_bt.perception.search.bodies import SEPARATE_NATS, outline_of
-from glotouch_bt.perception.search.map import FACING, Mask
+from glotouch_bt.perception.search.map import Mask
 from glotouch_bt.perception.search.tracing import OutlineTrace, TraceParams
 from glotouch_bt.perception.touch import Candidate, Contact, contour_quality, signed_distance
 from glotouch_bt.perception.touch.outline import KNOWN_QUALITY, convex_hull, envelope, polygon_distance
 from glotouch_bt.robot import Array
 
-SAME_M = 0.010
-"""Maximum distance from a candidate's envelope at which a contact belongs to it; objects stand farther apart."""
-BETWEEN_M = 0.018
-"""Maximum distance from the hull of the contacts of a half-traced candidate at which a contact belongs to it. Source:
-objects stand 30 mm apart and are pushed by a few millimetres."""
+TRACE = TraceParams()
+"""What belongs to a trace belongs to its candidate: the same distances and odds count."""
 PART_M = 0.030
 """Maximum distance from a candidate's envelope at which a contact is tested for belonging to it."""
-OTHER_OBJECT_ODDS = 0.02
-"""Prior odds that a contact near a candidate belongs to another object."""
 FLAT_M = 1e-4
 """Width across their line below which contacts count as collinear."""
 WELL_TRACED_QUALITY = 0.5
@@ -42,13 +37,13 @@ def part_of(known: tuple[Candidate, ...], first: Contact, radius_m: float) -> Ca
         if float(signed_distance(envelope(old), first.point_K_m[None])[0]) > PART_M:
             return None
         off = first.tip_K_m[:2] - old.contour.centre_K_m
-        if float(first.reaction_K[:2] @ off) < FACING * float(np.hypot(off[0], off[1])):
+        if float(first.reaction_K[:2] @ off) < TRACE.facing * float(np.hypot(off[0], off[1])):
             continue
         if overlaps(old, first.point_K_m[None]):
             return old
         one = outline_of((*old.contacts, first), radius_m)
         two = outline_of(old.contacts, radius_m).log_evidence + outline_of((first,), radius_m).log_evidence
-        if one.log_evidence > two + np.log(OTHER_OBJECT_ODDS) and max(one.contour.size_m) <= TraceParams().largest_m:
+        if one.log_evidence > two + np.log(TRACE.other) and max(one.contour.size_m) <= TRACE.largest_m:
             return old
     return None
 
@@ -110,7 +105,7 @@ def overlaps(old: Candidate, points: Array) -> bool:
     outside_m = signed_distance(envelope(old), points)
     if is_fully_traced(old):
         return float(np.median(outside_m)) <= ON_M
-    return float(outside_m.min()) <= SAME_M or _apart_m(old.contacts, points) <= BETWEEN_M
+    return float(outside_m.min()) <= TRACE.own_m or _apart_m(old.contacts, points) <= TRACE.between_m
 
 
 def lies_over(old: Candidate, traced: OutlineTrace) -> bool:

@@ -20,6 +20,7 @@ from glotouch_bt.perception.search.remaining import (
     discs,
     remaining,
 )
+from glotouch_bt.perception.search.tracing import TraceParams
 from glotouch_bt.perception.touch import Candidate, Contact, Contour, signed_distance
 from glotouch_bt.robot import Array, ParamError, frozen_array
 
@@ -33,9 +34,6 @@ MAX_PROTRUSION_M = 0.010
 """Maximum widening of an envelope by contacts outside the outline. Source: tuned in container_five (gaps of 30 mm)."""
 KNOWN_M = 0.005
 """Maximum distance from the envelope of a traced object at which a contact belongs to it."""
-FACING = -0.4
-"""Minimum cosine between the force on the ball and the direction from an object's centre to the contact for the contact
-to belong to the object."""
 MISSED_BELOW = 0.02
 """Chance that one of a known number of objects is missing, below which the search ends. Source: ours."""
 WALL_M = 0.003
@@ -244,10 +242,10 @@ class SearchMap:
 
     def knows(self, contact: Contact) -> bool:
         """Return True if a contact belongs to a traced object: near its envelope, on an outward-facing surface."""
-        tip = contact.tip_K_m[:2]
+        tip, least = contact.tip_K_m[:2], TraceParams().facing
         for e in self.exclusions:
             out = tip - e.contour.centre_K_m
-            facing = float(contact.reaction_K[:2] @ out) < FACING * float(np.hypot(out[0], out[1]))
+            facing = float(contact.reaction_K[:2] @ out) < least * float(np.hypot(out[0], out[1]))
             if e.traced and not facing and float(e.clearance(tip[None])[0]) < KNOWN_M:
                 return True
         return False

@@ -1,6 +1,6 @@
 """Plans that several skills share: stances of the open hand, closures, grasps, pushes, and the target's model."""
 
-from glotouch_skills.common.planning.clear_plan import Clearing, ClearPlanner, FreePlace
+from glotouch_skills.common.planning.clear_planner import Clearing, ClearPlanner, FreePlace
 from glotouch_skills.common.planning.finger_space import (
     Neighbour,
     finger_clearance_m,

@@ -11,7 +11,7 @@ from typing import ClassVar, TypeVar
 import numpy as np
 
 from glotouch_bt.motion import Motion
-from glotouch_bt.perception.search import Move, MoveOutcome, SearchPlan, T
+from glotouch_bt.perception.search import Move, MoveOutcome, SearchPlan
 from glotouch_bt.perception.touch import Contact, Contour, GuardParams
 from glotouch_bt.robot import Array, MotionRefused
 from glotouch_bt.skill import Context, Failure
@@ -20,6 +20,7 @@ from glotouch_skills.common.hand import GRAVITY_M_S2, rise_clear, weigh_N
 
 _Move = TypeVar("_Move")
 _Outcome = TypeVar("_Outcome")
+T = TypeVar("T")
 
 AT_HEIGHT_M = 0.004
 """The ball is at sensing height within this tolerance."""

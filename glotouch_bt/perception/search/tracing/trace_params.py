@@ -50,8 +50,8 @@ class TraceParams:
         reach_sds: Depth of a probe past the prediction, in standard deviations.
         facing: Minimum cosine between the force on the ball and the direction from the object's centre for the contact
             to belong to the object.
-        between_m: Distance from an earlier contact within which a contact always belongs to the object. Source: objects
-            stand 30 mm apart and are pushed by a few millimetres.
+        between_m: Distance from an earlier contact within which a contact always belongs to the object. Source: tuned
+            in container_five (gaps of 30 mm); `sharing` divides contacts of objects that touch later.
         same_m: Distance from an earlier contact within which a contact is not new.
         own_m: Distance from the prediction (plus two standard deviations) within which a contact belongs to the object;
             beyond, the evidence for one or two objects decides.

@@ -10,7 +10,7 @@ import pytest
 from glotouch_backends.rizon4 import RIZON4_XENSE
 from glotouch_bt.perception.touch import signed_distance
 from glotouch_skills.common.planning import NEEDED_M, Clearing, ClearPlanner, Neighbour, finger_space_m
-from glotouch_skills.common.planning.clear_plan import GAPS_M, GRID_M, FreePlace, keeps_gap, placed
+from glotouch_skills.common.planning.clear_planner import GAPS_M, GRID_M, FreePlace, keeps_gap, placed
 from glotouch_skills.common.planning.finger_space import cramped_stances, gap_m, wall_gap_m
 from glotouch_skills.make_space.carried import Grip, after_carry
 
