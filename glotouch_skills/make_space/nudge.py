@@ -272,9 +272,8 @@ class Nudge(Skill):
         early_m = 0.0 if np.isnan(felt.early_m) else felt.early_m
         if self.params.centre:
             moved = after_push(moving, push, felt.pushed_m, early_m, CENTRED_SD_M)
-            others = [c for c in self.known if c.index != moving.index]
-            with keeping_clear_of(self.context.arm, others):
-                standing, why_not = yield from centred(self.context, moved, push.yaw_K_rad, others)
+            with keeping_clear_of(self.context.arm, [c for c in self.known if c.index != moving.index]):
+                standing, why_not = yield from centred(self.context, moved, push.yaw_K_rad)
             if standing is not None:
                 return standing
             self.event("note", text=f"the jaws did not feel where candidate {moving.index} stands: {why_not}")
