@@ -27,7 +27,15 @@ class TrueOutline:
     @property
     def centre_K_m(self) -> Array:
         """Middle (2,) of the outline's bounding box at the start."""
-        return np.asarray(0.5 * (self.start_K_m.min(axis=0) + self.start_K_m.max(axis=0)))
+        return _middle(self.start_K_m)
+
+    def distance_m(self, place_K_m: Array) -> float:
+        """Return the distance of a place (2,) from the middle of the outline's bounding box, at the start or the end.
+
+        The nearer one counts: a candidate may be from before the object moved, or from afterwards.
+        """
+        outlines = [o for o in (self.start_K_m, self.end_K_m) if o is not None]
+        return min(float(np.linalg.norm(_middle(outline) - place_K_m)) for outline in outlines)
 
     @property
     def moved_m(self) -> float:
@@ -44,6 +52,10 @@ def true_outlines(record: RunRecord) -> list[TrueOutline]:
         return []
     start, end = ({str(o["name"]): _in_K(o["outline_B_m"], pose) for o in truth.get(w) or ()} for w in ("start", "end"))
     return [TrueOutline(name, outline, end.get(name)) for name, outline in start.items()]
+
+
+def _middle(outline_K_m: Array) -> Array:
+    return np.asarray(0.5 * (outline_K_m.min(axis=0) + outline_K_m.max(axis=0)))
 
 
 def _in_K(outline_B_m: object, pose_B_K: Pose) -> Array:

@@ -119,7 +119,10 @@ class RunFolder:
         if not holds_run(self.path):
             raise BadInput(f"{self.path}: is not empty and holds no run; give a new or an empty folder")
         if not overwrite:
-            raise BadInput(f"{self.path}: holds an earlier run; give another folder, or --overwrite to replace it")
+            resumable = not (self.path / "result.json").exists() and CheckpointFile.is_one(self.path / CHECKPOINT_FILE)
+            what = "a run that did not end" if resumable else "an earlier run"
+            go_on = f"; `glotouch resume {self.path}` goes on with it" if resumable else ""
+            raise BadInput(f"{self.path}: holds {what}; give another folder, or --overwrite to replace it{go_on}")
 
     def clear(self) -> None:
         """Remove the files of an earlier run, and nothing else; call when this run is certain to start."""

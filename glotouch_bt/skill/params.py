@@ -8,9 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class SkillParams(BaseModel):
-    """Base of every skill's parameters; YAML keys are the field names. Unknown keys are errors."""
+    """Base of every skill's parameters; YAML keys are the field names. Unknown keys are errors, wrong defaults, too."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
 
 
 def param(

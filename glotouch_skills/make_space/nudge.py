@@ -34,6 +34,11 @@ HEAD = ("object", "direction, deg", "pushed, mm", "resistance, N", "peak, N", "e
 """Head of the table in the report."""
 
 
+def pushes_in_words(rows: tuple[tuple[str, ...], ...]) -> str:
+    """Return the pushes so far in words, one phrase each; empty without any."""
+    return "; ".join(f"candidate {index}: {mm} mm at {deg} deg ({end})" for index, deg, mm, _, _, end in rows)
+
+
 class NudgeParams(SkillParams):
     """Parameters of `nudge`.
 
@@ -136,7 +141,7 @@ class Nudge(Skill):
     touchsets = Out(tuple, "touches of objects that were not pushed", element=TouchSet, always=True)
     refused = Out(tuple, "closures that could not be made, of the other objects", always=True)
     doubtful = Out(tuple, "the same, with those that the object came close to", element=int, always=True)
-    nudges = Out(tuple, "pushes so far, with this one", element=tuple, always=True)
+    nudges = Out(tuple, "pushes so far, with this one", element=tuple, always=True, result=pushes_in_words)
 
     def run(self) -> SkillRun:
         """See the class."""
@@ -304,4 +309,4 @@ class Nudge(Skill):
             f"{felt.peak_N:.1f}", end,
         )  # fmt: skip
         self.nudges = (*self.nudges, row)
-        self.report("Pushes", "Objects that were pushed to make space for the fingers.", HEAD, self.nudges)
+        self.report("Pushes", "Objects that the fingers pushed along the floor.", HEAD, self.nudges)

@@ -59,6 +59,23 @@ def test_a_clean_folder_is_replaced_only_when_asked(folder: Path) -> None:
     assert "holds the files to read" in objects("mine", "--units", "mm", "--out", "mine", "--overwrite")[2]
 
 
+def test_no_target_is_proposed_that_must_fail(folder: Path) -> None:
+    """A plate of 6 mm is lower than the ball's path."""
+    trimesh.creation.box((50, 40, 6)).export("plate.stl")
+    code, out, _ = objects("plate.stl", "--units", "mm", "--out", "clean")
+    assert (code, "not a target" in out, "--set target=" in out) == (0, True, False)
+    assert "none of them can be a target" in out
+
+
+def test_a_folder_of_several_units_is_to_be_sorted(folder: Path) -> None:
+    trimesh.creation.box((0.05, 0.04, 0.06)).export("mine/in_metres.stl")
+    code, out, _ = objects("mine")
+    assert (code, out.splitlines()[-1]) == (
+        2,
+        "next: sort the files by their unit (mm and that of the others) into folders",
+    )
+
+
 def test_the_rest_is_written_when_a_file_is_refused(folder: Path) -> None:
     Path("mine/bad.stl").write_text("no mesh")
     code, out, _ = objects("mine", "--units", "mm", "--out", "clean", "--json")

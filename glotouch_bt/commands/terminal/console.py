@@ -44,11 +44,11 @@ def print_result(done: RunResult) -> None:
         str(r["status"]), "[bold red]aborted[/]"
     )
     speed = r["sim_time_s"] / r["wall_time_s"] if r["wall_time_s"] else 0.0
-    true = r.get("true_peak_force_N")
+    felt, true = r["sensed_peak_force_N"], r.get("true_peak_force_N")
+    peaks = [*([f"{felt:.1f} N felt"] if felt else []), *([] if true is None else [f"{true:.1f} N true"])]
     console.print(
         f"{head}  {escape(str(r['mission']))}, seed {r['seed']}: {r['sim_time_s']:.1f} s of robot time in "
-        f"{r['wall_time_s']:.1f} s ({speed:.0f}x), peak force {r['sensed_peak_force_N']:.1f} N felt"
-        + ("" if true is None else f", {true:.1f} N true"),
+        f"{r['wall_time_s']:.1f} s ({speed:.0f}x)" + (f", peak force {', '.join(peaks)}" if peaks else ""),
         highlight=False,
         soft_wrap=True,
     )
@@ -82,10 +82,10 @@ def _fault_in_words(fault: Mapping[str, Any]) -> str:
         return f"fault {fault['name']}: NO EFFECT: {why}; this run does not test it"
     seen = fault["seen"]
     times = "once" if fault["applied"] == 1 else f"{fault['applied']} times"
-    detected = "not detected"
+    reaction = "no failure and no finding afterwards"
     if seen is not None:
-        detected = f"detected by {seen['by']} ({seen['code']}) after {fault['latency_s']:.2f} s"
-    return f"fault {fault['name']}: began {times}, {detected}"
+        reaction = f"first reaction afterwards: {seen['by']} ({seen['code']}), {fault['latency_s']:.2f} s later"
+    return f"fault {fault['name']}: began {times}; {reaction}"
 
 
 def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

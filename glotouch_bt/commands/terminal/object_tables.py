@@ -55,13 +55,19 @@ def print_objects(
         if isinstance(refused, RefusedFile):
             console.print(Text(f"refused: {refused.source.name}: {refused.reason}", style="red"))
     units = sorted({r.unit for r in results if isinstance(r, RefusedFile) and r.unit})
-    if len(units) == 1:
+    if len(units) == 1 and not good:
         console.print(f"next: glotouch objects {folder} --units {units[0]}", markup=False)
     elif units:
-        console.print(f"next: sort the files by their unit ({', '.join(units)}) into folders", markup=False)
+        others = " and that of the others" if good else ""
+        console.print(f"next: sort the files by their unit ({', '.join(units)}{others}) into folders", markup=False)
     if out is not None:
-        target = next((m.name for m in good if not m.faults), good[0].name)
+        target = next((m.name for m in good if not m.faults), None)
         console.print(f"written: {out} ({len(good)} objects); pictures: {out / 'objects.html'}", markup=False)
-        console.print(f"next: glotouch run retrieve --objects {out} --set target={target}", markup=False)
-    elif good:
+        if target is None:
+            console.print(
+                "none of them can be a target: none is found by touch and fits between the jaws", markup=False
+            )
+        else:
+            console.print(f"next: glotouch run retrieve --objects {out} --set target={target}", markup=False)
+    elif good and not units:
         console.print("next: add --out DIR to write them as clean objects, with pictures", markup=False)

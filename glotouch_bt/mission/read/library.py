@@ -8,6 +8,7 @@ from functools import cache
 from os.path import isfile
 from pathlib import Path
 
+from glotouch_bt.mission.read.declarations import declaration_fault
 from glotouch_bt.plugins import plugins
 from glotouch_bt.robot import BadInput, UnknownName
 from glotouch_bt.skill import Skill
@@ -77,7 +78,8 @@ class SkillRegistry(Mapping[str, type[Skill]]):
 
     Raises:
         UnknownName: On looking up a name that is not registered.
-        BadInput: On looking up a skill whose module cannot be imported here; with the place of the fault.
+        BadInput: On looking up a skill whose module cannot be imported here, with the place of the fault; or one that
+            declares something impossible.
     """
 
     def __init__(self, group: str = SKILL_GROUP) -> None:
@@ -95,6 +97,8 @@ class SkillRegistry(Mapping[str, type[Skill]]):
                 raise BadInput(f"skill {name!r} cannot be used here: {_fault_of_module(e)}") from e
             if not (isinstance(found, type) and issubclass(found, Skill)):
                 raise BadInput(f"entry point {name!r} of {self._group} is not a Skill class")
+            if fault := declaration_fault(found):
+                raise BadInput(f"skill {name!r} cannot be used here: {found.__name__}: {fault}")
             self._loaded[name] = found
         return self._loaded[name]
 

@@ -70,6 +70,10 @@ def _lost(node: Node) -> NodeSpec:
 def _named(name: str, place: Place, body: Node, scope: Scope) -> NodeSpec:
     if name in NODES:
         return _node_named(name, place, body, scope)
+    if " - " in name:
+        what = f"{name!r}: a '-' below is indented deeper than the entry above it; begin each '-' in the same column"
+        scope.findings.add(place, "not_a_node", what)
+        return NodeSpec("unknown", name, place, _children_of_unknown(body, scope))
     known = name
     if name not in scope.skills:
         also = {kind.btcpp: name for name, kind in NODES.items() if kind.btcpp}

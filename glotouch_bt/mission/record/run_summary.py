@@ -8,7 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from glotouch_bt.mission.record import OBJECTS_RESULT, Json, objects_in_words, to_json
-from glotouch_bt.robot import Array, Command, Observation
+from glotouch_bt.mission.record.recorded_requests import REQUEST, REQUEST_DONE
+from glotouch_bt.robot import Array, Command, Observation, Tare
 from glotouch_bt.untrusted import require_type
 
 
@@ -66,7 +67,8 @@ class RunSummary:
         node: Path of the last leaf that started.
         skill: Name of its skill; empty for another node.
         skill_cycles: Control cycles by skill.
-        peak_force_N: Largest norm of the sensed wrist force.
+        peak_force_N: Largest norm of the sensed wrist force since the first tare; before it, the sensor reads the
+            hand's weight.
         probe_path_m: Length of the path of P while the probe was in the jaws (between `tool` events).
     """
 
@@ -82,6 +84,8 @@ class RunSummary:
         self.node = self.skill = ""
         self.skill_cycles: dict[str, int] = {}
         self.peak_force_N = 0.0
+        self._tares: list[int] = []
+        self._tared = False
         self.probe_path_m = 0.0
         self._probe_held = False
         self._last_P_m: Array | None = None
@@ -100,8 +104,9 @@ class RunSummary:
         if not self._pending:
             return
         blocks, self._pending = self._pending, []
-        force = np.concatenate([b.wrench_S[:, :3] for b in blocks])
-        self.peak_force_N = max(self.peak_force_N, float(np.sqrt((force * force).sum(axis=1).max())))
+        if self._tared:
+            force = np.concatenate([b.wrench_S[:, :3] for b in blocks])
+            self.peak_force_N = max(self.peak_force_N, float(np.sqrt((force * force).sum(axis=1).max())))
         track = np.stack([b.position_B_P[-1] for b in blocks])
         if self._probe_held:
             start = track[:1] if self._last_P_m is None else self._last_P_m[None]
@@ -153,6 +158,11 @@ class RunSummary:
             self.results[str(data["key"])] = to_json({k: v for k, v in data.items() if k != "key"})
         elif kind == "calibration":
             self.calibration = to_json({k: v for k, v in data.items() if k in CALIBRATED})
+        elif kind == REQUEST and data.get("request") == Tare.__name__:
+            self._tares.append(int(str(data["number"])))
+        elif kind == REQUEST_DONE and not self._tared and data.get("number") in self._tares and not data.get("error"):
+            self.flush()
+            self._tared = True
         elif kind == "tool":
             self.flush()
             self._probe_held = bool(data.get("held", False))

@@ -93,7 +93,7 @@ _KINDS = (
     _Error("no_children", "the node needs a child"),
     _Error("too_large", "the tree has too many nodes or levels"),
     _Error("unknown_skill", "no skill or node has this name"),
-    _Error("unusable_skill", "the skill's module cannot be imported"),
+    _Error("unusable_skill", "the skill's module cannot be imported, or the skill declares something impossible"),
     _Error("unusable_subtree", "the subtree cannot be read"),
     _Error(
         "subtree_outside",
@@ -110,7 +110,7 @@ _KINDS = (
         "port_unset",
         "no node writes this input before it is read",
         "a skill without a required input stops the mission with an error; a condition on it can only fail",
-        "run the node that writes it first, or wire the port to another key",
+        "run the node that writes it first, wire the port to another key, or give a value: `in: {PORT: VALUE}`",
     ),
     _Error(
         "port_maybe_unset",

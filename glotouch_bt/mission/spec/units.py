@@ -31,6 +31,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "min": ("s", 60.0),
     "kg": ("kg", 1.0),
     "g": ("kg", 1e-3),
+    "kg/m3": ("kg/m3", 1.0),
     "Hz": ("Hz", 1.0),
     "kHz": ("Hz", 1e3),
     "%": ("", 1e-2),

@@ -42,12 +42,25 @@ def envelope(stamp_s: Array, value: Array, bins: int) -> tuple[Array, Array, Arr
     return stamp_s[middle], low, median, high
 
 
+def tared_force(record: RunRecord) -> tuple[Array, Array]:
+    """Return time (n,) s and the magnitude (n,) N of the wrist's force since the first tare.
+
+    Before it, the sensor reads the hand's weight. In a run without a tare, all of it is returned.
+    """
+    if not len(record.samples.get("stamp_s", ())):
+        return np.zeros(0), np.zeros(0)
+    stamp, force = record.samples["stamp_s"], np.linalg.norm(record.samples["force_S_N"], axis=1)
+    tares = {e.data.get("number") for e in record.of_kind("request") if e.data.get("request") == "Tare"}
+    done = [e.stamp_s for e in record.of_kind("request_done") if e.data.get("number") in tares]
+    first = int(np.searchsorted(stamp, min(done), side="right")) if done else 0
+    return stamp[first:], np.nan_to_num(force[first:])
+
+
 def force_section(record: RunRecord) -> str:
     """Return the section, or nothing if no force was recorded."""
-    if len(record.samples.get("stamp_s", ())) < 2:
+    stamp, force = tared_force(record)
+    if len(stamp) < 2:
         return ""
-    stamp = record.samples["stamp_s"]
-    force = np.nan_to_num(np.linalg.norm(record.samples["force_S_N"], axis=1))
     contacts = record.of_kind("contact")
     body = _trace(record, stamp, force, contacts)
     keys = [("k-force", "magnitude of the wrist force |F|, minimum to maximum of each interval")]
@@ -55,9 +68,9 @@ def force_section(record: RunRecord) -> str:
         keys.append(("k-contact", f"contact stop ({len(contacts)})"))
     body += legend(keys)
     if contacts:
-        body += _close_ups(stamp, record.samples["force_S_N"], contacts)
+        body += _close_ups(record.samples["stamp_s"], record.samples["force_S_N"], contacts)
     lead = (
-        "The force felt at the wrist over the whole run, relative to the last tare. Each dot is a contact stop. "
+        "The force felt at the wrist since the first tare, relative to the last one. Each dot is a contact stop. "
         "The chart below shows the opening of the jaws."
     )
     return section("Force", lead, body)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from glotouch_bt.mission.record import OBJECTS_RESULT, objects_in_words
 from glotouch_bt.report.page import esc, number
 from glotouch_bt.report.run_record import RunRecord
+from glotouch_bt.report.sections.force import tared_force
 from glotouch_bt.report.sections.map import candidates
 from glotouch_bt.report.sections.reasons import reason_chain
 
@@ -84,9 +83,9 @@ def _numbers(record: RunRecord) -> list[tuple[str, str]]:
     if closures:
         out.append(("jaw closures", str(closures)))
     felt = r.get("sensed_peak_force_N")
-    if not _real(felt) and len(record.samples.get("stamp_s", ())):
-        felt = float(np.nan_to_num(np.linalg.norm(record.samples["force_S_N"], axis=1)).max())
-    out.append(("peak force felt at the wrist", number(felt, 1, "N")))
+    if not _real(felt):
+        felt = float(tared_force(record)[1].max(initial=0.0))
+    out.append(("peak force felt at the wrist", number(felt, 1, "N") if felt else "not tared"))
     out.append(("true peak force (simulation)", number(r.get("true_peak_force_N"), 1, "N")))
     if _real(r.get("probe_path_m")):
         out.append(("probe path", number(r["probe_path_m"], 2, "m")))

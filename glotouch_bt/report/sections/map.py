@@ -201,7 +201,7 @@ def _table(found: list[dict[str, Any]], truth: list[TrueOutline]) -> str:
         assert contour is not None
         size, centre = contour.size_m, contour.centre_K_m
         row = [f"<b>{c['index']}</b>", esc(contour.kind)]
-        near = min(truth, key=lambda o: float(np.linalg.norm(o.centre_K_m - centre)), default=None)
+        near = min(truth, key=lambda o: o.distance_m(centre), default=None)
         if near is not None:
             row.append(esc(near.name))
         both = f"{number(size[0], 1, scale=1e3)} × {number(size[1], 1, scale=1e3)}"
@@ -209,12 +209,16 @@ def _table(found: list[dict[str, Any]], truth: list[TrueOutline]) -> str:
             f"{number(float(centre[0]), 1, scale=1e3)}, {number(float(centre[1]), 1, scale=1e3)}",
             f"⌀ {number(size[0], 1, scale=1e3)}" if contour.kind == "round" else both,
             "–" if contour.kind == "round" else number(float(np.rad2deg(contour.yaw_rad)), 0) + "°",
-            number(c.get("height_m"), 1, scale=1e3),
+            number(c.get("height_m") if c.get("top_touched", True) else None, 1, scale=1e3),
             number(contour.rms_m, 2, scale=1e3),
             str(len(c.get("contacts") or [])),
             number(c.get("quality"), 2),
         ]
         if near is not None:
-            row.append(number(float(np.linalg.norm(near.centre_K_m - centre)), 1, scale=1e3))
+            row.append(number(near.distance_m(centre), 1, scale=1e3))
         rows.append(row)
-    return "<h3>Candidates</h3>" + table(head, rows, numeric_from=first_number)
+    note = "<p>Height: of objects whose top was touched. Quality: 1 is a centre known exactly, 0.5 to 5 mm."
+    note += (
+        " Centre off: from the middle of the true outline, at the start or the end of the run.</p>" if truth else "</p>"
+    )
+    return "<h3>Candidates</h3>" + table(head, rows, numeric_from=first_number) + note

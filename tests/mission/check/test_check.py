@@ -68,6 +68,11 @@ MISTAKES: list[tuple[str, str, list[tuple[int, int, str, str]]]] = [
     ("setting out of range", HEAD + "tree:\n  timeout: {seconds: 0, do: find}\n", [(4, 22, "wrong_range", "> 0")]),
     ("bad policy", HEAD + "tree:\n  parallel: {policy: most, do: [find]}\n", [(4, 22, "wrong_type", "'all' or 'one'")]),
     ("two names in one node", HEAD + "tree:\n  - find:\n    act:\n", [(5, 5, "not_a_node", "indentation")]),
+    (
+        "an entry below another one",
+        HEAD + "tree:\n  sequence:\n    do:\n      - tool_pickup\n        - tool_return\n",
+        [(6, 9, "not_a_node", "begin each '-' in the same column")],
+    ),
     ("a number is no node", HEAD + "tree:\n  - 7\n", [(4, 5, "not_a_node", "a node is expected here")]),
     ("skill with a list", HEAD + "tree:\n  find: [1]\n", [(4, 9, "wrong_type", "must be a mapping")]),
     ("unknown world", "mission: m\nworld: worlds/containr_five.yaml\ntree: find\n", [(2, 8, "unknown_world", "did you mean 'container_five'")]),

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from glotouch_bt.mission.record import NullRecord, RunSummary
-from glotouch_bt.robot import HOLD
+from glotouch_bt.robot import HOLD, Observation
 from glotouch_bt.robot.fake import FakeRobot
 
 
@@ -55,3 +58,28 @@ def test_cycles_are_counted_by_skill() -> None:
     again = RunSummary(NullRecord())
     again.restore(summary.state())
     assert again.skill_cycles == summary.skill_cycles
+
+
+def pressed(newtons: float) -> Observation:
+    """Return a block in which the wrist reads a force along x."""
+    observation = FakeRobot().observe()
+    wrench = np.zeros_like(observation.wrench_S)
+    wrench[:, 0] = newtons
+    return replace(observation, wrench_S=wrench)
+
+
+def test_the_peak_force_counts_from_the_first_tare_on() -> None:
+    """Before it, the sensor reads the weight of the hand. A tare that failed does not count."""
+    summary = RunSummary(NullRecord())
+    for number, error in enumerate((None, "the arm moved", None)):
+        summary.block(pressed(9.0), HOLD)
+        summary.event("request", 1.0, {"number": number, "request": "Payload" if number == 0 else "Tare"})
+        summary.event("request_done", 1.0, {"number": number, "error": error})
+    summary.flush()
+    assert summary.peak_force_N == 0.0
+    again = RunSummary(NullRecord())
+    again.restore(summary.state())
+    for newtons in (2.5, 1.0):
+        again.block(pressed(newtons), HOLD)
+    again.flush()
+    assert again.peak_force_N == pytest.approx(2.5)
