@@ -14,8 +14,11 @@ from markdown_text import NOTE, cell, code, prose, table
 import glotouch_bt
 from glotouch_bt.cli import app
 from glotouch_bt.motion import Arm, MoveResult
+from glotouch_bt.perception.recognition import Match
+from glotouch_bt.perception.touch import Candidate, Contact, Contour, Layer, TouchSequence, TouchSet
 from glotouch_bt.robot import Pose, SetPayload, Tare, World
 from glotouch_bt.skill import Context
+from glotouch_bt.skill.probing import HeldTool
 
 MAX_WIDTH = 90
 """Characters of a signature on one line."""
@@ -48,9 +51,18 @@ Slow requests go to the device: `ticket = self.context.requests.start(Tare())`, 
 """
 
 
+VALUES = """# Values of ports
+
+What the shipped skills hand on through ports: `candidates` is a tuple of [Candidate](#candidate), `touchsets` one of
+[TouchSet](#touchset), `tool` a [HeldTool](#heldtool). Lengths are in metres; names say unit and frame: K is the
+container, P the mid-point between the pads. So the centre of the first object in the box is
+`self.candidates[0].contour.centre_K_m`.
+"""
+
+
 def pages() -> dict[str, str]:
     """Return the pages by their path below docs/."""
-    texts = {"cli": cli(), "motions": motions(), "api": api()}
+    texts = {"cli": cli(), "motions": motions(), "values": values(), "api": api()}
     return {f"reference/{name}.md": NOTE + text.rstrip() + "\n" for name, text in texts.items()}
 
 
@@ -144,6 +156,14 @@ def motions() -> str:
         found = getattr(Arm, name)
         text.append(f"## {name}\n\n    {_signature(name, found)}\n\n{prose(found.__doc__ or '')}\n")
     for kind in (MoveResult, Context, Pose, Tare, SetPayload, World):
+        text += _class(kind.__name__, kind, _members(kind))
+    return "\n".join(t for t in text if t)
+
+
+def values() -> str:
+    """Return the page on the values that skills hand on through ports."""
+    text = [VALUES]
+    for kind in (Candidate, Contour, Contact, TouchSet, TouchSequence, Layer, Match, HeldTool):
         text += _class(kind.__name__, kind, _members(kind))
     return "\n".join(t for t in text if t)
 

@@ -188,9 +188,7 @@ class _Rules:
             if "@" not in key.removeprefix(prefix) and self._sets.values(looked, variable) - {UNSET}
         )
         names = [k.rpartition("/")[2] for k in written if k.rpartition("/")[0] == prefix]
-        near = Findings.near(requirement.key.rpartition("/")[2], names)
-        valid = ", ".join(near) + (f" and {len(names) - len(near)} more" if len(names) > len(near) else "")
-        valid = valid or "no key is written yet"
+        valid = Findings.listed(requirement.key.rpartition("/")[2], names) or "no key is written yet"
         if prefix and (outer := [k for k in written if "/" not in k]):
             valid += f"; of the caller, to be wired with ports: {', '.join(outer)}"
         hint = self._findings.nearest(requirement.key.rpartition("/")[2], names)

@@ -107,10 +107,13 @@ class Findings:
         return plain[near[0]] if near else ""
 
     @staticmethod
-    def near(name: str, valid: Iterable[str], most: int = 12) -> list[str]:
-        """Return the valid names in alphabetical order; of more than `most`, those that are most like `name`."""
+    def listed(name: str, valid: Iterable[str], max_names: int = 12) -> str:
+        """Return the valid names in alphabetical order; of many, those that are most like `name`, and how many more."""
         names = sorted(valid)
-        return names if len(names) <= most else sorted(difflib.get_close_matches(name, names, n=most, cutoff=0.0))
+        if len(names) <= max_names:
+            return ", ".join(names)
+        near = sorted(difflib.get_close_matches(name, names, n=max_names, cutoff=0.0))
+        return f"{', '.join(near)} and {len(names) - len(near)} more"
 
     def unknown(
         self, place: Place, code: str, kind: str, name: str, valid: Iterable[str], also: Mapping[str, str] = NO_NAMES
@@ -122,7 +125,7 @@ class Findings:
         names = sorted(valid)
         nearest = self.nearest(name, [*names, *also])
         hint = also.get(nearest, nearest)
-        self.add(place, code, f"unknown {kind} {name!r}", valid=", ".join(names) or "none", hint=hint)
+        self.add(place, code, f"unknown {kind} {name!r}", valid=self.listed(name, names) or "none", hint=hint)
         return hint
 
     def sorted(self) -> list[Finding]:
