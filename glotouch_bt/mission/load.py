@@ -183,9 +183,14 @@ def _read(
     if not isinstance(source, Map):
         findings.add(source.place, "wrong_type", "a mission must be a mapping", valid=", ".join(MISSION_KEYS))
         return None
-    if not any(key in source for key in MISSION_KEYS):
-        what = "is no mission: it has none of the keys of one"
-        findings.add(Place(shown(path)), "wrong_type", what, valid=", ".join(MISSION_KEYS))
+    is_plan = "faults" in source and "tree" not in source
+    if is_plan or not any(key in source for key in MISSION_KEYS):
+        if is_plan:
+            what = "is no mission but a fault plan: `glotouch run MISSION --faults PLAN` checks it and runs with it"
+            findings.add(source.place, "wrong_type", what)
+        else:
+            what = "is no mission: it has none of the keys of one"
+            findings.add(Place(shown(path)), "wrong_type", what, valid=", ".join(MISSION_KEYS))
         return None
     for key, _ in source.entries:
         if key.value not in MISSION_KEYS:

@@ -75,7 +75,7 @@ class RunProgress:
         if self._quiet:
             return
         now = time.perf_counter()
-        node = summary.node.rsplit("/", 1)[-1]
+        node = _leaf(summary)
         if self._live is not None:
             if now - self._shown_s >= REFRESH_S:
                 self._shown_s = now
@@ -90,7 +90,7 @@ class RunProgress:
     def _lines(self, robot_s: float, wall_s: float, summary: RunSummary) -> Group:
         """Return the lines of a terminal."""
         word, colour = PHASES.get(summary.last_event[1], ("running", "green"))
-        doing = Text.assemble((f"{word:<8}", colour), *self._place(summary.node), no_wrap=True, overflow="ellipsis")
+        doing = Text.assemble((f"{word:<8}", colour), *self._place(summary), no_wrap=True, overflow="ellipsis")
         objects = f"{len(summary.candidates)}{self._objects}"
         facts = f"        contacts {summary.contacts}   objects {objects}{_best(summary)}"
         speed = robot_s / wall_s if wall_s > 0.5 else 0.0
@@ -104,11 +104,18 @@ class RunProgress:
             Text.assemble(times, (keys, "dim"), no_wrap=True, overflow="ellipsis"),
         )
 
-    def _place(self, path: str) -> list[tuple[str, str]]:
+    def _place(self, summary: RunSummary) -> list[tuple[str, str]]:
         """Return the part of the mission, a subtree, and the running skill."""
+        path = summary.node
         cuts = [i for i, c in enumerate(path) if c == "/"]
         part = next((self._parts[path[:i]] for i in cuts if path[:i] in self._parts), "")
-        return [*([(part, ""), (" › ", "dim")] if part else []), (path.rsplit("/", 1)[-1], "bold")]
+        return [*([(part, ""), (" › ", "dim")] if part else []), (_leaf(summary), "bold")]
+
+
+def _leaf(summary: RunSummary) -> str:
+    """Return the name of the running leaf, without the number that only tells it from others in the tree."""
+    name, skill = summary.node.rsplit("/", 1)[-1], summary.skill
+    return skill if skill and name.removeprefix(skill).strip().isdigit() else name
 
 
 def usual_duration_s(folder: Path, mission: str) -> float | None:

@@ -73,6 +73,7 @@ MISTAKES: list[tuple[str, str, list[tuple[int, int, str, str]]]] = [
         HEAD + "tree:\n  sequence:\n    do:\n      - tool_pickup\n        - tool_return\n",
         [(6, 9, "not_a_node", "begin each '-' in the same column")],
     ),
+    ("a fault plan", "faults: x\nplan: []\n", [(1, 1, "wrong_type", "glotouch run MISSION --faults PLAN")]),
     ("a number is no node", HEAD + "tree:\n  - 7\n", [(4, 5, "not_a_node", "a node is expected here")]),
     ("skill with a list", HEAD + "tree:\n  find: [1]\n", [(4, 9, "wrong_type", "must be a mapping")]),
     ("unknown world", "mission: m\nworld: worlds/containr_five.yaml\ntree: find\n", [(2, 8, "unknown_world", "did you mean 'container_five'")]),
