@@ -158,6 +158,8 @@ class Skill(PortsMixin, py_trees.behaviour.Behaviour, register=False):  # type: 
             yield from come_to_rest(self.context)
         self.context.arm.not_run.clear()
         body: Generator[Command, Observation, object] = self.run()
+        if not isinstance(body, Generator):
+            raise TypeError(f"run() is no generator but returned {body!r}: it has no `yield` and no `yield from`")
         try:
             returned = yield from body
         except SkillFailed:

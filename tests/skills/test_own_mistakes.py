@@ -37,3 +37,16 @@ def test_an_output_that_is_not_written_is_an_error(bench) -> None:
     b = bench()
     with pytest.raises(TypeError, match=r"without writing the output 'height_m': write `self\.height_m"):
         b.run(b.make(Silent))
+
+
+class NoYield(Skill):
+    """Returns at once what it should yield."""
+
+    def run(self) -> SkillRun:
+        return 3  # type: ignore[return-value]
+
+
+def test_run_is_a_generator(bench) -> None:
+    b = bench()
+    with pytest.raises(TypeError, match=r"run\(\) is no generator but returned 3: it has no `yield`"):
+        b.run(b.make(NoYield))
