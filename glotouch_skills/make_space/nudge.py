@@ -35,8 +35,11 @@ HEAD = ("object", "direction, deg", "pushed, mm", "resistance, N", "peak, N", "e
 
 
 def pushes_in_words(rows: tuple[tuple[str, ...], ...]) -> str:
-    """Return the pushes so far in words, one phrase each; empty without any."""
-    return "; ".join(f"candidate {index}: {mm} mm at {deg} deg ({end})" for index, deg, mm, _, _, end in rows)
+    """Return the pushes so far in words, empty without any. Rows are as under `HEAD`; others are left out."""
+    pushes = [dict(zip(HEAD, row, strict=True)) for row in rows if len(row) == len(HEAD)]
+    return "; ".join(
+        f"candidate {p['object']}: {p['pushed, mm']} mm at {p['direction, deg']} deg ({p['end']})" for p in pushes
+    )
 
 
 class NudgeParams(SkillParams):

@@ -276,7 +276,11 @@ def _yields_nothing() -> Iterator[object]:
 
 @pytest.mark.parametrize(
     ("body", "message"),
-    [(_returns_a_status, "returned <Status.FAILURE"), (_yields_nothing, "yielded None"), (lambda: 3, "not iterable")],
+    [
+        (_returns_a_status, "returned <Status.FAILURE"),
+        (_yields_nothing, "yielded None"),
+        (lambda: 3, "run() is no generator"),
+    ],
 )
 def test_a_body_that_gives_what_no_body_gives_is_not_taken_for_success(
     go: Any, robot: Any, monkeypatch: pytest.MonkeyPatch, body: Callable[[], Any], message: str
