@@ -53,7 +53,7 @@ Slow requests go to the device: `ticket = self.context.requests.start(Tare())`, 
 
 VALUES = """# Values of ports
 
-What the shipped skills hand on through ports: `candidates` is a tuple of [Candidate](#candidate), `touchsets` one of
+Values that the shipped skills write to ports: `candidates` is a tuple of [Candidate](#candidate), `touchsets` one of
 [TouchSet](#touchset), `tool` a [HeldTool](#heldtool). Lengths are in metres; names say unit and frame: K is the
 container, P the mid-point between the pads. So the centre of the first object in the box is
 `self.candidates[0].contour.centre_K_m`.

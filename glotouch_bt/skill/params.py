@@ -8,7 +8,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class SkillParams(BaseModel):
-    """Base of every skill's parameters; YAML keys are the field names. Unknown keys are errors, wrong defaults, too."""
+    """Base of every skill's parameters; YAML keys are the field names.
+
+    Unknown keys are errors, and so are defaults outside their own range.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
 

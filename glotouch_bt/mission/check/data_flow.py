@@ -129,7 +129,7 @@ class DataFlow:
             self.looked[requirements[0]].add(entry)
 
     def preemptible(self, node: NodeSpec) -> bool:
-        """Return True if a node above may preempt this one; otherwise nobody asks for its state while it runs."""
+        """Return True if a node above may preempt this one; otherwise its states while it runs are not needed."""
         return id(node) in self._preemptible
 
     def look(self, node: NodeSpec, port: str, entry: int) -> Requirement | None:

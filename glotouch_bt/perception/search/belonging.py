@@ -12,7 +12,7 @@ from glotouch_bt.perception.touch.outline import KNOWN_QUALITY, convex_hull, env
 from glotouch_bt.robot import Array
 
 TRACE = TraceParams()
-"""What belongs to a trace belongs to its candidate: the same distances and odds count."""
+"""Parameters of a trace: a contact belongs to a candidate at the same distances and odds as to a trace."""
 PART_M = 0.030
 """Maximum distance from a candidate's envelope at which a contact is tested for belonging to it."""
 FLAT_M = 1e-4

@@ -51,7 +51,8 @@ def tared_force(record: RunRecord) -> tuple[Array, Array]:
         return np.zeros(0), np.zeros(0)
     stamp, force = record.samples["stamp_s"], np.linalg.norm(record.samples["force_S_N"], axis=1)
     tares = {e.data.get("number") for e in record.of_kind("request") if e.data.get("request") == "Tare"}
-    done = [e.stamp_s for e in record.of_kind("request_done") if e.data.get("number") in tares]
+    ended = [e for e in record.of_kind("request_done") if e.data.get("number") in tares]
+    done = [e.stamp_s for e in ended if not e.data.get("error")]
     first = int(np.searchsorted(stamp, min(done), side="right")) if done else 0
     return stamp[first:], np.nan_to_num(force[first:])
 

@@ -217,8 +217,8 @@ def _table(found: list[dict[str, Any]], truth: list[TrueOutline]) -> str:
         if near is not None:
             row.append(number(near.distance_m(centre), 1, scale=1e3))
         rows.append(row)
-    note = "<p>Height: of objects whose top was touched. Quality: 1 is a centre known exactly, 0.5 to 5 mm."
-    note += (
-        " Centre off: from the middle of the true outline, at the start or the end of the run.</p>" if truth else "</p>"
-    )
-    return "<h3>Candidates</h3>" + table(head, rows, numeric_from=first_number) + note
+    said = "Height: of objects whose top was touched. "
+    said += "Quality: certainty of the centre, 0.5 at a standard deviation of 5 mm."
+    if truth:
+        said += " Centre off: from the middle of the true outline, at the start or the end of the run."
+    return "<h3>Candidates</h3>" + table(head, rows, numeric_from=first_number) + f"<p>{said}</p>"

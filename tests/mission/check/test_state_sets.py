@@ -7,7 +7,7 @@ from itertools import product
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glotouch_bt.mission.nodes.base import EMPTY, StateSets
+from glotouch_bt.mission.nodes.base import EMPTY, StateSets, ValueSets
 from tests.support.examples import examples
 
 
@@ -55,3 +55,12 @@ def test_diagrams_are_sets(sizes: list[int], steps: list[tuple[int, int, int, in
         for before, same in kept:
             assert (before == made) == (same == want)
         kept.append((made, want))
+
+
+def test_a_variable_that_changes_twice_has_a_value_of_either() -> None:
+    """Two outputs that are wired to one key; the larger sets contain the exact ones."""
+    for algebra in (StateSets([4, 2]), ValueSets([4, 2])):
+        changes = algebra.changes([(0, (1,), False), (1, (1,), True), (0, (2,), True)])
+        made = algebra.write(algebra.start, changes)
+        assert algebra.values(made, 0) == {1, 2}
+        assert algebra.values(made, 1) == {0, 1}

@@ -1,4 +1,4 @@
-"""What a skill declares is checked when it is loaded."""
+"""The declarations of a skill are checked when it is loaded."""
 
 from __future__ import annotations
 

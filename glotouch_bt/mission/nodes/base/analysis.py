@@ -112,7 +112,7 @@ class DataFlowAnalysis(Protocol):
         """Note that requirements are looked at in these states; they are always looked at together."""
 
     def preemptible(self, node: NodeSpec) -> bool:
-        """Return True if a node above may preempt this one; otherwise nobody asks for its state while it runs."""
+        """Return True if a node above may preempt this one; otherwise its states while it runs are not needed."""
 
     def look(self, node: NodeSpec, port: str, entry: int) -> Requirement | None:
         """Note that the node reads a port (or resource) in these states; returns the requirement."""

@@ -140,10 +140,7 @@ class StateSets:
             wanted: Variable, its possible values afterwards, and whether it may keep its value. What changes twice has
                 one of the values of both.
         """
-        merged: dict[int, tuple[int, bool]] = {}
-        for variable, values, keep in wanted:
-            bits, both = merged.get(variable, (0, True))
-            merged[variable] = (bits | _bits(values), both and keep)
+        merged = merged_changes(wanted)
         made = 0  # the changes of variables that are tested later; equal rests have one number
         for variable in sorted(merged):
             if variable not in self._ignored:
@@ -194,6 +191,15 @@ class StateSets:
     def _values(self, given: int, variable: int) -> int:
         """Return these values as bits."""
         return self._held[given] >> self._first[variable] & (1 << self._sizes[variable]) - 1
+
+
+def merged_changes(wanted: Iterable[tuple[int, Iterable[int], bool]]) -> dict[int, tuple[int, bool]]:
+    """Return, for each changed variable, its possible values as bits, and whether it may keep its value."""
+    merged: dict[int, tuple[int, bool]] = {}
+    for variable, values, keep in wanted:
+        bits, both = merged.get(variable, (0, True))
+        merged[variable] = (bits | _bits(values), both and keep)
+    return merged
 
 
 def _bits(values: Iterable[int]) -> int:

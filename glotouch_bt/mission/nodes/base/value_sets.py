@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import accumulate
 
-from glotouch_bt.mission.nodes.base.state_sets import EMPTY
+from glotouch_bt.mission.nodes.base.state_sets import EMPTY, merged_changes
 
 
 class ValueSets:
@@ -56,7 +56,8 @@ class ValueSets:
 
     def changes(self, wanted: Iterable[tuple[int, Iterable[int], bool]]) -> int:
         """Return the number of some changes, for `write`; see `StateSets`."""
-        self._changes.append([(self._all[v], self._bits(v, values), keep) for v, values, keep in wanted])
+        merged = merged_changes(wanted).items()
+        self._changes.append([(self._all[v], bits << self._first[v], keep) for v, (bits, keep) in merged])
         return len(self._changes) - 1
 
     def write(self, given: int, changes: int) -> int:
