@@ -107,7 +107,12 @@ def admit(
     if better is None:
         outline = traced.outline
         better = Candidate(
-            _next_index(belief, known), outline.contour, height_m, quality(outline), traced.contacts, False
+            _index_at(belief, known, outline.contour),
+            outline.contour,
+            height_m,
+            quality(outline),
+            traced.contacts,
+            False,
         )
     parts = bodies(better.contacts, radius, belief.path_K_m)
     if len(parts) == 1 and max(better.contour.size_m) > MAX_LENGTH_M:
@@ -307,6 +312,20 @@ def _occupied(candidate: Candidate) -> Contour:
     size, yaw = minimum_rectangle(hull)[1:]
     middle = area_and_centroid(hull)[1]
     return Contour("box", middle, (size[0], size[1]), yaw, 0.0, np.zeros(0), family="free", boundary_K_m=hull)
+
+
+def _index_at(belief: SearchMap, known: tuple[Candidate, ...], contour: Contour) -> int:
+    """Return the index of the nearest candidate that is traced anew where a new outline is; without any, a new one."""
+    there = {c.index for c in known}
+    middle = contour.centre_K_m
+
+    def overlaps_it(old: Candidate) -> bool:
+        pairs = (envelope(old), middle), (contour, old.contour.centre_K_m)
+        return any(float(signed_distance(outline, centre[None])[0]) < 0.0 for outline, centre in pairs)
+
+    places = [c for c in belief.to_replace if c.index not in there and overlaps_it(c)]
+    nearest = min(places, key=lambda c: float(np.linalg.norm(c.contour.centre_K_m - middle)), default=None)
+    return _next_index(belief, known) if nearest is None else nearest.index
 
 
 def _next_index(belief: SearchMap, candidates: Iterable[Candidate]) -> int:

@@ -96,6 +96,7 @@ class SearchMap:
             to be probed.
         probed: Indices of the candidates that were probed for that; each is probed once.
         first_index: Least index of a new candidate; smaller ones may have been given to candidates that were forgotten.
+        to_replace: Candidates that are traced anew, as they were: a new one in the place of one of them gets its index.
     """
 
     half_extent_m: Array
@@ -110,6 +111,7 @@ class SearchMap:
     unprobed: bool = False
     probed: tuple[int, ...] = ()
     first_index: int = 0
+    to_replace: tuple[Candidate, ...] = ()
 
     @classmethod
     def blank(

@@ -9,6 +9,7 @@ bodies become one, or the contacts of one body pass to several neighbours.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -34,6 +35,14 @@ OVERLAP_SD_M = 0.003
 """Standard deviation of the depth to which the outlines of two bodies seem to overlap. Source: ours."""
 MAX_OVERLAP_NATS = 60.0
 """Log evidence that an overlap costs at most: an outline that is hardly known may be far off. Source: ours."""
+UNKNOWN_QUALITY = 0.1
+"""Quality of an outline below which hardly anything is known of it: its centre has a standard deviation of 15 mm.
+Source: ours."""
+MISFIT_M = 0.005
+"""Root mean square distance, m, of contacts from their outline above which they are not those of one body. Source:
+measured in 24 maps (`bench search --world touching_five --seed 60176`, 9b525534): at most 4.0 mm where the outline's
+centre was right; 6 to 21 mm where a trace had mixed two bodies.
+"""
 MIN_GAIN_NATS = 3.0
 """Minimum gain of log evidence of a step. Source: ours."""
 NEAR_M = 0.015
@@ -83,13 +92,18 @@ def overlap_depth_m(a: Contour, b: Contour) -> float:
     return -min(float(signed_distance(one, other.outline_K_m()).min()) for one, other in ((a, b), (b, a)))
 
 
-def contradictions(candidates: Sequence[Candidate]) -> dict[int, str]:
+def contradictions(candidates: Sequence[Candidate], settled: float = math.inf) -> dict[int, str]:
     """Return the index of each candidate whose outline cannot be right, and why.
 
-    Such an outline is still uncertain, or it is the less certain one of two that overlap: bodies do not. Objects that
-    are pushed while they are traced leave such outlines.
+    Its contacts do not fit it, it is uncertain, or it is the less certain one of two that overlap: bodies do not.
+    Traces that pass on to a neighbour leave such outlines, and objects that are pushed while they are traced.
+
+    Args:
+        candidates: All candidates.
+        settled: Number of contacts from which on an outline is right although it is uncertain, unless hardly anything
+            is known of it: beside walls and neighbours, an object has sides that cannot be touched.
     """
-    wrong = {c.index: "its outline is still uncertain" for c in candidates if c.quality < KNOWN_QUALITY}
+    wrong = {c.index: why for c in candidates if (why := _why_wrong(c, settled))}
     for one, other in combinations((c for c in candidates if c.index not in wrong), 2):
         depth_m = overlap_depth_m(one.contour, other.contour)
         if depth_m > OVERLAP_M:
@@ -98,6 +112,16 @@ def contradictions(candidates: Sequence[Candidate]) -> dict[int, str]:
                 worse.index, f"its outline overlaps that of candidate {better.index} by {1e3 * depth_m:.0f} mm"
             )
     return wrong
+
+
+def _why_wrong(candidate: Candidate, settled: float) -> str:
+    """Return why an outline cannot be right by itself; empty if it may be."""
+    uncertain = candidate.quality < (KNOWN_QUALITY if len(candidate.contacts) < settled else UNKNOWN_QUALITY)
+    if uncertain:
+        return "its outline is still uncertain"
+    points = np.array([c.point_K_m for c in candidate.contacts])
+    misfit_m = float(np.sqrt(np.mean(signed_distance(candidate.contour, points) ** 2)))
+    return f"its contacts are {1e3 * misfit_m:.0f} mm off its outline" if misfit_m > MISFIT_M else ""
 
 
 def _ids(contacts: tuple[Contact, ...]) -> frozenset[int]:
