@@ -31,15 +31,8 @@ from glotouch_bt.perception.touch import (
     signed_distance,
     split_at_motion,
 )
-from glotouch_bt.perception.touch.outline import (
-    KNOWN_QUALITY,
-    OutlineBelief,
-    area_and_centroid,
-    convex_hull,
-    envelope,
-    minimum_rectangle,
-)
-from glotouch_bt.robot import Array, ParamError
+from glotouch_bt.perception.touch.outline import OutlineBelief, envelope, occupied
+from glotouch_bt.robot import Array
 
 MIN_CONTACTS = 3
 """Minimum number of contacts of a candidate's outline."""
@@ -137,7 +130,7 @@ def _with_parts(
         every[index] = replace(whole, index=index)
         if len(parts) > 1:
             every[index] = _with(every[index], body, outline_of(body, radius_m))
-        belief = belief.with_exclusion(_occupied(every[index]), exclusion_m, index)
+        belief = belief.with_exclusion(occupied(every[index]), exclusion_m, index)
         changed.append(index)
     return _admitted(belief, every, radius_m, whole.index, tuple(changed))
 
@@ -270,7 +263,7 @@ def all_separated(admitted: Admitted, radius_m: float, exclusion_m: float) -> Ad
         if new is None:
             belief = belief.without_exclusion(old.index)
         elif new is not old:
-            belief = belief.with_exclusion(_occupied(new), exclusion_m, new.index)
+            belief = belief.with_exclusion(occupied(new), exclusion_m, new.index)
     changed = tuple(i for i in dict.fromkeys((*admitted.changed, *altered)) if i in every)
     return _admitted(belief, every, radius_m, admitted.index if admitted.index in every else changed[0], changed)
 
@@ -294,24 +287,9 @@ def _assign_parts(
     indices = chain((one.index, other.index), count(_next_index(belief, admitted.candidates)))
     for index, body in zip(indices, parts, strict=False):
         every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius_m))
-        belief = belief.with_exclusion(_occupied(every[index]), exclusion_m, index)
+        belief = belief.with_exclusion(occupied(every[index]), exclusion_m, index)
         changed = tuple(dict.fromkeys((*changed, index)))
     return _admitted(belief, every, radius_m, one.index, changed)
-
-
-def _occupied(candidate: Candidate) -> Contour:
-    """Return where certainly nothing else stands: the envelope, or only the hull of the contacts if the centre is
-    uncertain. The search then also looks where such a candidate is only presumed.
-    """
-    if candidate.quality >= KNOWN_QUALITY:
-        return envelope(candidate)
-    try:
-        hull = convex_hull(np.array([c.point_K_m for c in candidate.contacts]))
-    except ParamError:
-        return envelope(candidate)
-    size, yaw = minimum_rectangle(hull)[1:]
-    middle = area_and_centroid(hull)[1]
-    return Contour("box", middle, (size[0], size[1]), yaw, 0.0, np.zeros(0), family="free", boundary_K_m=hull)
 
 
 def _index_at(belief: SearchMap, known: tuple[Candidate, ...], contour: Contour) -> int:
