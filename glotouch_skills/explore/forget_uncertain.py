@@ -1,4 +1,4 @@
-"""Forget outlines that cannot be right, so that the search finds these objects again."""
+"""Forget the contacts of outlines that cannot be right, so that the search traces these objects anew."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 
 AROUND_M = 0.02
-"""Distance around a forgotten outline within which the floor is searched again. Source: ours; objects that are traced
+"""Distance around such an outline within which the floor is searched again. Source: ours; objects that are traced
 move by up to 20 mm."""
 SETTLED = TraceParams().max_contacts // 2
 """Number of contacts of an uncertain outline from which on new contacts do not make it more certain. Source: measured
@@ -29,11 +29,13 @@ class ForgetUncertainParams(SkillParams):
 
 
 class ForgetUncertain(Skill):
-    """Forget the outlines that are still uncertain after they were refined, or overlap others.
+    """Forget the contacts of outlines that cannot be right although they were refined.
 
-    An object that is pushed while it is traced leaves such an outline: its contacts are from several places. Further
-    contacts do not mend it. The search goes back to where it was touched, and traces it with new contacts only. It goes
-    on, too, if fewer candidates are left than objects are expected: two of them turned out to be one body.
+    Such an outline does not fit its contacts, overlaps another one, or is uncertain after few contacts. A trace that
+    passes on to a neighbour leaves it, and so does an object that is pushed while it is traced: further contacts do not
+    mend it. The search goes back to where it was touched, and traces it with new contacts only. Until then, record and
+    report show it as it was, and the new outline gets its index. The search goes on, too, if fewer candidates are left
+    than objects are expected: two of them turned out to be one body. With as many candidates as objects, it does not.
 
     SUCCESS: `candidates` and `map` have no such outline. `search_done` is true if there was none and no object is
     missing, or if the search went on often enough.
@@ -78,9 +80,6 @@ class ForgetUncertain(Skill):
             belief = belief.with_hints((*belief.hints, *reversed(candidate.contacts)))
             self.context.arm.felt.forget_free_near(candidate.contour.centre_K_m)
             self.event("note", text=f"candidate {candidate.index} is traced anew: {wrong[candidate.index]}")
-        if belief.expected is not None:
-            bodies = len(self.candidates) + sum(len(c.contacts) >= SETTLED for c in gone)
-            belief = replace(belief, expected=max(belief.expected, bodies))
         self.map = belief
         reasons = [(str(i), why) for i, why in wrong.items()] or [("-", MISSING)]
         self.retraced = (*rows, *((str(times + 1), *reason) for reason in reasons))
