@@ -40,9 +40,7 @@ UNKNOWN_QUALITY = 0.1
 Source: ours."""
 MISFIT_M = 0.005
 """Root mean square distance, m, of contacts from their outline above which they are not those of one body. Source:
-measured in 24 maps (`bench search --world touching_five --seed 60176`, 9b525534): at most 4.0 mm where the outline's
-centre was right; 6 to 21 mm where a trace had mixed two bodies.
-"""
+ours; limbs of a figure lie a few millimetres off its outline."""
 MIN_GAIN_NATS = 3.0
 """Minimum gain of log evidence of a step. Source: ours."""
 NEAR_M = 0.015

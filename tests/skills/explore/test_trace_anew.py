@@ -1,4 +1,4 @@
-"""forget_uncertain: outlines that cannot be right are traced anew, and their contacts become hints."""
+"""trace_anew: outlines that cannot be right are traced anew, and their contacts become hints."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from glotouch_bt.perception.recognition import ProbeTouch
 from glotouch_bt.perception.search import SearchMap
-from glotouch_skills.explore.forget_uncertain import AROUND_M, MISSING, ForgetUncertain
+from glotouch_skills.explore.trace_anew import AROUND_M, MISSING, TraceAnew
 
 HALF = (0.17, 0.12)
 
@@ -31,9 +31,9 @@ def searched(things, expected: int | None = 3) -> SearchMap:
     return belief
 
 
-def run(bench, things, belief: SearchMap, traced=(0, 1, 2), **inputs) -> ForgetUncertain:
+def run(bench, things, belief: SearchMap, traced=(0, 1, 2), **inputs) -> TraceAnew:
     probed = tuple(ProbeTouch(i, "outline") for i in traced)
-    skill = bench.make(ForgetUncertain, inputs={"before": belief, "known": things, "before_probed": probed, **inputs})
+    skill = bench.make(TraceAnew, inputs={"before": belief, "known": things, "before_probed": probed, **inputs})
     bench.run(skill)
     assert skill.status is Status.SUCCESS, skill.feedback_message
     return skill
@@ -121,6 +121,6 @@ def test_it_forgets_only_so_often(bench, found) -> None:
 
 def test_without_a_map_it_fails(bench) -> None:
     b = bench()
-    skill = b.make(ForgetUncertain, inputs={})
+    skill = b.make(TraceAnew, inputs={})
     b.run(skill)
     assert (skill.status, skill.reason.code) == (Status.FAILURE, "nothing_searched")

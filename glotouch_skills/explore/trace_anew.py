@@ -1,4 +1,4 @@
-"""Forget the contacts of outlines that cannot be right, so that the search traces these objects anew."""
+"""Choose outlines that cannot be right, so that the search traces them anew."""
 
 from __future__ import annotations
 
@@ -14,22 +14,20 @@ AROUND_M = 0.02
 """Distance around such an outline within which the floor is searched again. Source: ours; objects that are traced
 move by up to 20 mm."""
 SETTLED = TraceParams().max_contacts // 2
-"""Number of contacts of an uncertain outline from which on new contacts do not make it more certain. Source: measured
-(`bench search --world touching_five --seed 60176`, 9b525534): of 19 such outlines with 10 contacts or more, 13 had the
-right centre within 11 mm, and lacked a side beside a wall or a neighbour."""
-
+"""Number of contacts of an uncertain outline from which on new ones would not make it more certain. Source: ours; most
+such outlines are right, and lack a side beside a wall or a neighbour."""
 MISSING = "fewer objects are known than expected"
 """Why the search goes on without a wrong outline."""
 
 
-class ForgetUncertainParams(SkillParams):
-    """Parameters of `forget_uncertain`."""
+class TraceAnewParams(SkillParams):
+    """Parameters of `trace_anew`."""
 
     times: int = param("Largest number of times that the search goes on", default=2, ge=0, le=20)
 
 
-class ForgetUncertain(Skill):
-    """Forget the contacts of outlines that cannot be right although they were refined.
+class TraceAnew(Skill):
+    """Choose the outlines that cannot be right although they were refined, so that the search traces them anew.
 
     Such an outline does not fit its contacts, overlaps another one, or is uncertain after few contacts. A trace that
     passes on to a neighbour leaves it, and so does an object that is pushed while it is traced: further contacts do not
@@ -41,8 +39,8 @@ class ForgetUncertain(Skill):
     missing, or if the search went on often enough.
     """
 
-    Params = ForgetUncertainParams
-    params: ForgetUncertainParams
+    Params = TraceAnewParams
+    params: TraceAnewParams
 
     NOTHING_SEARCHED = Failure("nothing_searched", "there is no map yet", advice="sweep first, with guarded_sweep")
 
