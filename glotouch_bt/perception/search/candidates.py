@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import chain, count
+from itertools import chain
 
 import numpy as np
 import scipy
@@ -100,7 +100,7 @@ def admit(
     if better is None:
         outline = traced.outline
         better = Candidate(
-            _index_at(belief, known, outline.contour),
+            _index_at(belief, (c.index for c in known), outline.contour),
             outline.contour,
             height_m,
             quality(outline),
@@ -126,10 +126,9 @@ def _with_parts(
     every = {c.index: c for c in known} | {whole.index: whole}
     changed: list[int] = []
     for body in parts:
-        index = _next_index(belief, every.values()) if changed else whole.index
-        every[index] = replace(whole, index=index)
-        if len(parts) > 1:
-            every[index] = _with(every[index], body, outline_of(body, radius_m))
+        part = _with(whole, body, outline_of(body, radius_m)) if len(parts) > 1 else whole
+        index = _index_at(belief, every, part.contour) if changed else whole.index
+        every[index] = replace(part, index=index)
         belief = belief.with_exclusion(occupied(every[index]), exclusion_m, index)
         changed.append(index)
     return _admitted(belief, every, radius_m, whole.index, tuple(changed))
@@ -284,32 +283,35 @@ def _assign_parts(
     belief, changed = admitted.belief, admitted.changed
     mine = {id(c) for c in one.contacts}
     parts = tuple(sorted(parts, key=lambda body: -sum(id(c) in mine for c in body)))
-    indices = chain((one.index, other.index), count(_next_index(belief, admitted.candidates)))
-    for index, body in zip(indices, parts, strict=False):
-        every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius_m))
+    had = {c.index for c in admitted.candidates}
+    for k, body in enumerate(parts):
+        outline = outline_of(body, radius_m)
+        index = (one, other)[k].index if k < 2 else _index_at(belief, had | set(every), outline.contour)
+        every[index] = _with(replace(every.get(index, other), index=index), body, outline)
         belief = belief.with_exclusion(occupied(every[index]), exclusion_m, index)
         changed = tuple(dict.fromkeys((*changed, index)))
     return _admitted(belief, every, radius_m, one.index, changed)
 
 
-def _index_at(belief: SearchMap, known: tuple[Candidate, ...], contour: Contour) -> int:
-    """Return the index of the nearest candidate that is traced anew where a new outline is; without any, a new one."""
-    there = {c.index for c in known}
-    middle = contour.centre_K_m
+def _index_at(belief: SearchMap, known: Iterable[int], contour: Contour) -> int:
+    """Return the index of the nearest candidate that is traced anew where a new outline is; without any, a new one.
+
+    Args:
+        belief: The map.
+        known: Indices of all candidates.
+        contour: The new outline.
+    """
+    there, middle = set(known), contour.centre_K_m
 
     def overlaps_it(old: Candidate) -> bool:
         pairs = (envelope(old), middle), (contour, old.contour.centre_K_m)
         return any(float(signed_distance(outline, centre[None])[0]) < 0.0 for outline, centre in pairs)
 
     places = [c for c in belief.to_replace if c.index not in there and overlaps_it(c)]
-    nearest = min(places, key=lambda c: float(np.linalg.norm(c.contour.centre_K_m - middle)), default=None)
-    return _next_index(belief, known) if nearest is None else nearest.index
-
-
-def _next_index(belief: SearchMap, candidates: Iterable[Candidate]) -> int:
-    """Return an index that no candidate has or had."""
-    traced = (e.index + 1 for e in belief.exclusions if e.index is not None)
-    return max(chain((c.index + 1 for c in candidates), traced, (belief.first_index,)))
+    if places:
+        return min(places, key=lambda c: float(np.linalg.norm(c.contour.centre_K_m - middle))).index
+    traced = (e.index for e in belief.exclusions if e.index is not None)
+    return max(belief.first_index, *(i + 1 for i in chain(there, traced)), 0)
 
 
 def _admitted(

@@ -93,7 +93,8 @@ def overlap_depth_m(a: Contour, b: Contour) -> float:
 def contradictions(candidates: Sequence[Candidate], settled: float = math.inf) -> dict[int, str]:
     """Return the index of each candidate whose outline cannot be right, and why.
 
-    Its contacts do not fit it, it is uncertain, or it is the less certain one of two that overlap: bodies do not.
+    It is narrower than any object, its contacts do not fit it, it is uncertain, or it is the less certain one of two
+    that overlap: bodies do not.
     Traces that pass on to a neighbour leave such outlines, and objects that are pushed while they are traced.
 
     Args:
@@ -117,6 +118,8 @@ def _why_wrong(candidate: Candidate, settled: float) -> str:
     uncertain = candidate.quality < (KNOWN_QUALITY if len(candidate.contacts) < settled else UNKNOWN_QUALITY)
     if uncertain:
         return "its outline is still uncertain"
+    if (width_m := min(candidate.contour.size_m)) < MIN_BODY_M:
+        return f"its outline is only {1e3 * width_m:.0f} mm wide"
     points = np.array([c.point_K_m for c in candidate.contacts])
     misfit_m = float(np.sqrt(np.mean(signed_distance(candidate.contour, points) ** 2)))
     return f"its contacts are {1e3 * misfit_m:.0f} mm off its outline" if misfit_m > MISFIT_M else ""

@@ -91,6 +91,12 @@ def test_an_outline_that_its_contacts_do_not_fit_is_traced_anew(bench, found) ->
     assert skill.retraced == (("1", "1", "its contacts are 11 mm off its outline"),)
 
 
+def test_an_outline_narrower_than_any_object_is_traced_anew(bench, found) -> None:
+    things = (*three(found)[:2], found.box((0.08, 0.0), (0.09, 0.012), index=2))
+    skill = run(bench(), things, searched(things))
+    assert skill.retraced == (("1", "2", "its outline is only 12 mm wide"),)
+
+
 def test_one_that_is_not_found_again_is_forgotten(bench, found) -> None:
     things = three(found)
     belief = replace(searched(things), to_replace=(things[1],))
