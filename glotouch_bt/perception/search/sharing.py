@@ -35,9 +35,9 @@ OVERLAP_SD_M = 0.003
 """Standard deviation of the depth to which the outlines of two bodies seem to overlap. Source: ours."""
 MAX_OVERLAP_NATS = 60.0
 """Log evidence that an overlap costs at most: an outline that is hardly known may be far off. Source: ours."""
-UNKNOWN_QUALITY = 0.1
-"""Quality of an outline below which hardly anything is known of it: its centre has a standard deviation of 15 mm.
-Source: ours."""
+UNKNOWN_QUALITY = 0.2
+"""Quality below which an outline is traced anew however many contacts it has: its centre has a standard deviation of
+10 mm. Source: ours."""
 MISFIT_M = 0.005
 """Root mean square distance, m, of contacts from their outline above which they are not those of one body. Source:
 ours; limbs of a figure lie a few millimetres off its outline."""
@@ -99,8 +99,8 @@ def contradictions(candidates: Sequence[Candidate], settled: float = math.inf) -
 
     Args:
         candidates: All candidates.
-        settled: Number of contacts from which on an outline is right although it is uncertain, unless hardly anything
-            is known of it: beside walls and neighbours, an object has sides that cannot be touched.
+        settled: Number of contacts from which on an outline counts as right although it is uncertain, unless its
+            quality is below `UNKNOWN_QUALITY`: beside walls and neighbours, an object has sides that cannot be touched.
     """
     wrong = {c.index: why for c in candidates if (why := _why_wrong(c, settled))}
     for one, other in combinations((c for c in candidates if c.index not in wrong), 2):

@@ -72,7 +72,7 @@ def test_a_map_that_may_be_right_is_kept(bench, found) -> None:
 
 def test_an_uncertain_outline_with_many_contacts_is_kept(bench, found) -> None:
     """It has sides that cannot be touched. With few contacts it is traced anew, but may be no object."""
-    many = three(found, quality=0.2)
+    many = three(found, quality=0.25)
     assert run(bench(), many, searched(many)).search_done
     few = (many[0], replace(many[1], contacts=many[1].contacts[:3]), many[2])
     skill = run(bench(), few, searched(few, 2))
