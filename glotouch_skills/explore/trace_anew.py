@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from glotouch_bt.perception.recognition import ProbeTouch
-from glotouch_bt.perception.search import SearchMap, TraceParams, contradictions
+from glotouch_bt.perception.search import SearchMap, contradictions
 from glotouch_bt.perception.touch import Candidate
 from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
@@ -13,9 +13,6 @@ from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, pa
 AROUND_M = 0.02
 """Distance around such an outline within which the floor is searched again. Source: ours; objects that are traced
 move by up to 20 mm."""
-SETTLED = TraceParams().max_contacts // 2
-"""Number of contacts of an uncertain outline from which on new ones would not make it more certain. Source: ours; most
-such outlines are right, and lack a side beside a wall or a neighbour."""
 MISSING = "fewer objects are known than expected"
 """Why the search goes on without a wrong outline."""
 
@@ -29,11 +26,12 @@ class TraceAnewParams(SkillParams):
 class TraceAnew(Skill):
     """Choose the outlines that cannot be right although they were refined, so that the search traces them anew.
 
-    Such an outline does not fit its contacts, overlaps another one, or is uncertain after few contacts. A trace that
-    passes on to a neighbour leaves it, and so does an object that is pushed while it is traced: further contacts do not
-    mend it. The search goes back to where it was touched, and traces it with new contacts only. Until then, record and
-    report show it as it was, and the new outline gets its index. The search goes on, too, if fewer candidates are left
-    than objects are expected: two of them turned out to be one body. With as many candidates as objects, it does not.
+    Such an outline is uncertain, too narrow for an object, overlaps another one, or does not fit its contacts. A trace
+    that passes on to a neighbour leaves it, and so does an object that is pushed while it is traced: further contacts
+    do not mend it. The search goes back to where it was touched, and traces it with new contacts only. Until then,
+    record and report show it as it was, and the new outline gets its index. The search goes on, too, if fewer
+    candidates are left than objects are expected: two of them turned out to be one body. With as many candidates as
+    objects, it does not.
 
     SUCCESS: `candidates` and `map` have no such outline. `search_done` is true if there was none and no object is
     missing, or if the search went on often enough.
@@ -62,7 +60,7 @@ class TraceAnew(Skill):
         known, probed, rows = self.known or (), self.before_probed or (), self.before_retraced or ()
         belief = self._without_lost(self.before.only_with(known), known)
         refined = {t.candidate for t in probed if t.part == "outline"}
-        wrong = contradictions([c for c in known if c.index in refined], SETTLED)
+        wrong = contradictions([c for c in known if c.index in refined])
         missing = belief.expected is not None and belief.found < belief.expected
         times = len({row[0] for row in rows})
         self.search_done = not (wrong or missing) or times >= self.params.times

@@ -9,7 +9,6 @@ bodies become one, or the contacts of one body pass to several neighbours.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -35,9 +34,6 @@ OVERLAP_SD_M = 0.003
 """Standard deviation of the depth to which the outlines of two bodies seem to overlap. Source: ours."""
 MAX_OVERLAP_NATS = 60.0
 """Log evidence that an overlap costs at most: an outline that is hardly known may be far off. Source: ours."""
-UNKNOWN_QUALITY = 0.2
-"""Quality below which an outline is traced anew however many contacts it has: its centre has a standard deviation of
-10 mm. Source: ours."""
 MISFIT_M = 0.005
 """Root mean square distance, m, of contacts from their outline above which they are not those of one body. Source:
 ours; limbs of a figure lie a few millimetres off its outline."""
@@ -90,19 +86,14 @@ def overlap_depth_m(a: Contour, b: Contour) -> float:
     return -min(float(signed_distance(one, other.outline_K_m()).min()) for one, other in ((a, b), (b, a)))
 
 
-def contradictions(candidates: Sequence[Candidate], settled: float = math.inf) -> dict[int, str]:
+def contradictions(candidates: Sequence[Candidate]) -> dict[int, str]:
     """Return the index of each candidate whose outline cannot be right, and why.
 
-    It is narrower than any object, its contacts do not fit it, it is uncertain, or it is the less certain one of two
-    that overlap: bodies do not.
-    Traces that pass on to a neighbour leave such outlines, and objects that are pushed while they are traced.
-
-    Args:
-        candidates: All candidates.
-        settled: Number of contacts from which on an outline counts as right although it is uncertain, unless its
-            quality is below `UNKNOWN_QUALITY`: beside walls and neighbours, an object has sides that cannot be touched.
+    It is uncertain, it is narrower than any object, its contacts do not fit it, or it is the less certain one of two
+    that overlap: bodies do not. Traces that pass on to a neighbour leave such outlines, and objects that are pushed
+    while they are traced.
     """
-    wrong = {c.index: why for c in candidates if (why := _why_wrong(c, settled))}
+    wrong = {c.index: why for c in candidates if (why := _why_wrong(c))}
     for one, other in combinations((c for c in candidates if c.index not in wrong), 2):
         depth_m = overlap_depth_m(one.contour, other.contour)
         if depth_m > OVERLAP_M:
@@ -113,10 +104,9 @@ def contradictions(candidates: Sequence[Candidate], settled: float = math.inf) -
     return wrong
 
 
-def _why_wrong(candidate: Candidate, settled: float) -> str:
+def _why_wrong(candidate: Candidate) -> str:
     """Return why an outline cannot be right by itself; empty if it may be."""
-    uncertain = candidate.quality < (KNOWN_QUALITY if len(candidate.contacts) < settled else UNKNOWN_QUALITY)
-    if uncertain:
+    if candidate.quality < KNOWN_QUALITY:
         return "its outline is still uncertain"
     if (width_m := min(candidate.contour.size_m)) < MIN_BODY_M:
         return f"its outline is only {1e3 * width_m:.0f} mm wide"
