@@ -29,7 +29,7 @@ def measures(call: Call) -> Any:
 
 
 def forgets(times: int) -> Any:
-    """Return forget_uncertain's answers: the outline is forgotten so many times."""
+    """Return trace_anew's answers: the outline is forgotten so many times."""
     calls: list[Call] = []
 
     def answer(call: Call) -> Any:
@@ -47,7 +47,7 @@ def run_survey(scripted: Any, times: int, **more: Any) -> Any:
     script = {
         "orbit_probe*": ok(candidates=candidates(0.5), found=1, complete=True),
         "next_probe*": measures,
-        "forget_uncertain*": forgets(times),
+        "trace_anew*": forgets(times),
     }
     return scripted("survey", script | more, settings={})
 
@@ -55,14 +55,14 @@ def run_survey(scripted: Any, times: int, **more: Any) -> Any:
 def test_a_certain_map_is_made_once(scripted: Any) -> None:
     run = run_survey(scripted, 0)
     assert run.succeeded
-    once = ["guarded_sweep", "orbit_probe", "next_probe", "refine_outline", "next_probe", "forget_uncertain"]
+    once = ["guarded_sweep", "orbit_probe", "next_probe", "refine_outline", "next_probe", "trace_anew"]
     assert [c.skill for c in run.calls] == [*START, *once, *END]
 
 
 def test_what_stays_uncertain_is_searched_and_traced_anew_before_its_top_is_touched(scripted: Any) -> None:
     run = run_survey(scripted, 2)
     assert run.succeeded
-    again = ["guarded_sweep", "orbit_probe", "next_probe", "refine_outline", "next_probe", "forget_uncertain"]
+    again = ["guarded_sweep", "orbit_probe", "next_probe", "refine_outline", "next_probe", "trace_anew"]
     ready = ["tool_check", "wrist_check"]
     assert [c.skill for c in run.calls] == [*START, *again, *ready, *again, *ready, *again, *END]
 
@@ -71,10 +71,10 @@ def test_how_often_is_a_parameter(scripted: Any) -> None:
     run = scripted(
         "survey",
         {"orbit_probe*": ok(candidates=candidates(0.5), found=1, complete=True), "next_probe*": measures,
-         "forget_uncertain*": forgets(0)},
+         "trace_anew*": forgets(0)},
         settings={"retraces": 7},
     )  # fmt: skip
-    assert [c.params.times for c in run.calls_of("forget_uncertain")] == [7]
+    assert [c.params.times for c in run.calls_of("trace_anew")] == [7]
 
 
 def test_a_search_that_cannot_go_on_ends_safely(scripted: Any) -> None:

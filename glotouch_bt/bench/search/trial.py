@@ -8,6 +8,7 @@ returning the probe) discovers nothing and is not counted.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -28,6 +29,8 @@ from glotouch_bt.runs import RunRequest
 
 SWEEP_NODE, TRACE_NODE, REFINE_NODE = "guarded_sweep", "orbit_probe", "refine_outline"
 TOP_NODE = "touch_top"
+AGAIN = re.compile(r" \d+$")
+"""Number of a node that stands in a tree several times."""
 STILL_M = 0.0003
 """Smallest step that counts as travel; a standing arm sways by less."""
 EMPTY_ROW: dict[str, Any] = {
@@ -122,8 +125,8 @@ def scene(mission: str, objects: Path | None, world: str | None = None) -> tuple
 def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, Any]:
     """Score the discoveries of a recorded run against its truth.
 
-    A candidate that was forgotten counts as never traced. `contact_gap_mm` are the distances of the ball from the true
-    probe section where sweeps stopped.
+    A candidate that was forgotten counts as never found; one that is traced anew keeps its index. `contact_gap_mm` are
+    the distances of the ball from the true probe section where sweeps stopped.
 
     Raises:
         BadInput: The record has no truth beside it.
@@ -134,23 +137,20 @@ def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, 
     layout = true_layout(record.truth, pose_B_K, sections)
     way = TipPath.of(record)
     heights = {e.data["candidate"]: float(e.data["height_m"]) for e in record.of_kind("top")}
-    traced: dict[int, list[tuple[float, Any]]] = {}
-    final: dict[int, tuple[float, Any]] = {}
+    states: dict[int, list[tuple[float, Any]]] = {}
+    contacts: dict[int, int] = {}
     for e in record.of_kind("candidate", "forgotten"):
         if e.kind == "forgotten":
             for gone in e.data["candidates"]:
-                traced.pop(gone, None)
-                final.pop(gone, None)
-            continue
-        index = int(e.data["candidate"]["index"])
-        if index not in final or e.data["node"] != TOP_NODE:
-            final[index] = (e.stamp_s, e.data["candidate"])
-        if "displaced_m" in e.data:
-            traced.setdefault(index, []).append((way.travel_m(e.stamp_s), e.data["candidate"]))
-    found = [_found(*states[-1], heights.get(i), states[:-1]) for i, states in sorted(traced.items())]
-    measured = [_found(way.travel_m(final[i][0]), final[i][1], heights.get(i)) for i in sorted(traced)]
-    row = score(found, layout, measured)
-    row["contacts"] = sum(len(states[-1][1]["contacts"]) for states in traced.values())
+                states.pop(gone, None)
+                contacts.pop(gone, None)
+        elif AGAIN.sub("", e.data["node"]) != TOP_NODE:
+            index = int(e.data["candidate"]["index"])
+            states.setdefault(index, []).append((way.travel_m(e.stamp_s), e.data["candidate"]))
+            if "displaced_m" in e.data:
+                contacts[index] = len(e.data["candidate"]["contacts"])
+    row = score([_found(*of[-1], heights.get(i), of[:-1]) for i, of in sorted(states.items())], layout)
+    row["contacts"] = sum(contacts.values())
     row["contact_gap_mm"] = _gaps(record, layout)
     return row | {"travel_m": way.total_m, "before_m": way.before_m}
 

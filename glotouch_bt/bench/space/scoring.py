@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from glotouch_bt.bench.planar import FeltSection
-from glotouch_bt.bench.search import Found, TrueLayout, assign, true_layout
+from glotouch_bt.bench.search import AGAIN, Found, TrueLayout, assign, true_layout
 from glotouch_bt.report import RecordedEvent, RunRecord
 from glotouch_bt.robot import Array, BadInput, Pose
 
@@ -18,8 +18,6 @@ TOPPLED_DEG = 30.0
 """Least tilt against its first pose at which an object counts as toppled. Source: ours."""
 ENDED = {"nudge": "pushed", "clear": "set down"}
 """How the `candidate` event of each act says that the object was moved."""
-AGAIN = re.compile(r" \d+$")
-"""Number of a node that stands in a tree several times."""
 OBJECT = re.compile(r"/object (\d+)$")
 """End of the path of the node that moves one object."""
 

@@ -108,16 +108,8 @@ def print_settings(title: str, described: Sequence[Mapping[str, Any]]) -> None:
 
 def print_skills(described: Sequence[dict[str, Any]]) -> None:
     """Print one line for each skill."""
-    rows = [
-        (
-            d["name"],
-            ", ".join(p["key"] for p in d["inputs"]),
-            ", ".join(p["key"] for p in d["outputs"]),
-            d["description"].split("\n", 1)[0],
-        )
-        for d in described
-    ]
-    print_table("skills", ("name", "reads", "writes", "description"), rows)
+    print_table("skills", ("name", "description"), [(d["name"], d["description"].split("\n", 1)[0]) for d in described])
+    sys.stdout.write("glotouch skills NAME describes one: parameters, ports, states and failures\n")
 
 
 def print_skill(d: dict[str, Any]) -> None:

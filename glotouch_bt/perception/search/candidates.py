@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import chain, count
+from itertools import chain
 
 import numpy as np
 import scipy
@@ -31,15 +31,8 @@ from glotouch_bt.perception.touch import (
     signed_distance,
     split_at_motion,
 )
-from glotouch_bt.perception.touch.outline import (
-    KNOWN_QUALITY,
-    OutlineBelief,
-    area_and_centroid,
-    convex_hull,
-    envelope,
-    minimum_rectangle,
-)
-from glotouch_bt.robot import Array, ParamError
+from glotouch_bt.perception.touch.outline import OutlineBelief, envelope, occupied
+from glotouch_bt.robot import Array
 
 MIN_CONTACTS = 3
 """Minimum number of contacts of a candidate's outline."""
@@ -107,7 +100,12 @@ def admit(
     if better is None:
         outline = traced.outline
         better = Candidate(
-            _next_index(belief, known), outline.contour, height_m, quality(outline), traced.contacts, False
+            _index_at(belief, (c.index for c in known), outline.contour),
+            outline.contour,
+            height_m,
+            quality(outline),
+            traced.contacts,
+            False,
         )
     parts = bodies(better.contacts, radius, belief.path_K_m)
     if len(parts) == 1 and max(better.contour.size_m) > MAX_LENGTH_M:
@@ -128,11 +126,10 @@ def _with_parts(
     every = {c.index: c for c in known} | {whole.index: whole}
     changed: list[int] = []
     for body in parts:
-        index = _next_index(belief, every.values()) if changed else whole.index
-        every[index] = replace(whole, index=index)
-        if len(parts) > 1:
-            every[index] = _with(every[index], body, outline_of(body, radius_m))
-        belief = belief.with_exclusion(_occupied(every[index]), exclusion_m, index)
+        part = _with(whole, body, outline_of(body, radius_m)) if len(parts) > 1 else whole
+        index = _index_at(belief, every, part.contour) if changed else whole.index
+        every[index] = replace(part, index=index)
+        belief = belief.with_exclusion(occupied(every[index]), exclusion_m, index)
         changed.append(index)
     return _admitted(belief, every, radius_m, whole.index, tuple(changed))
 
@@ -265,7 +262,7 @@ def all_separated(admitted: Admitted, radius_m: float, exclusion_m: float) -> Ad
         if new is None:
             belief = belief.without_exclusion(old.index)
         elif new is not old:
-            belief = belief.with_exclusion(_occupied(new), exclusion_m, new.index)
+            belief = belief.with_exclusion(occupied(new), exclusion_m, new.index)
     changed = tuple(i for i in dict.fromkeys((*admitted.changed, *altered)) if i in every)
     return _admitted(belief, every, radius_m, admitted.index if admitted.index in every else changed[0], changed)
 
@@ -286,33 +283,35 @@ def _assign_parts(
     belief, changed = admitted.belief, admitted.changed
     mine = {id(c) for c in one.contacts}
     parts = tuple(sorted(parts, key=lambda body: -sum(id(c) in mine for c in body)))
-    indices = chain((one.index, other.index), count(_next_index(belief, admitted.candidates)))
-    for index, body in zip(indices, parts, strict=False):
-        every[index] = _with(replace(every.get(index, other), index=index), body, outline_of(body, radius_m))
-        belief = belief.with_exclusion(_occupied(every[index]), exclusion_m, index)
+    had = {c.index for c in admitted.candidates}
+    for k, body in enumerate(parts):
+        outline = outline_of(body, radius_m)
+        index = (one, other)[k].index if k < 2 else _index_at(belief, had | set(every), outline.contour)
+        every[index] = _with(replace(every.get(index, other), index=index), body, outline)
+        belief = belief.with_exclusion(occupied(every[index]), exclusion_m, index)
         changed = tuple(dict.fromkeys((*changed, index)))
     return _admitted(belief, every, radius_m, one.index, changed)
 
 
-def _occupied(candidate: Candidate) -> Contour:
-    """Return where certainly nothing else stands: the envelope, or only the hull of the contacts if the centre is
-    uncertain. The search then also looks where such a candidate is only presumed.
+def _index_at(belief: SearchMap, known: Iterable[int], contour: Contour) -> int:
+    """Return the index of the nearest candidate that is traced anew where a new outline is; without any, a new one.
+
+    Args:
+        belief: The map.
+        known: Indices of all candidates.
+        contour: The new outline.
     """
-    if candidate.quality >= KNOWN_QUALITY:
-        return envelope(candidate)
-    try:
-        hull = convex_hull(np.array([c.point_K_m for c in candidate.contacts]))
-    except ParamError:
-        return envelope(candidate)
-    size, yaw = minimum_rectangle(hull)[1:]
-    middle = area_and_centroid(hull)[1]
-    return Contour("box", middle, (size[0], size[1]), yaw, 0.0, np.zeros(0), family="free", boundary_K_m=hull)
+    there, middle = set(known), contour.centre_K_m
 
+    def overlaps_it(old: Candidate) -> bool:
+        pairs = (envelope(old), middle), (contour, old.contour.centre_K_m)
+        return any(float(signed_distance(outline, centre[None])[0]) < 0.0 for outline, centre in pairs)
 
-def _next_index(belief: SearchMap, candidates: Iterable[Candidate]) -> int:
-    """Return an index that no candidate has or had."""
-    traced = (e.index + 1 for e in belief.exclusions if e.index is not None)
-    return max(chain((c.index + 1 for c in candidates), traced, (belief.first_index,)))
+    places = [c for c in belief.to_replace if c.index not in there and overlaps_it(c)]
+    if places:
+        return min(places, key=lambda c: float(np.linalg.norm(c.contour.centre_K_m - middle))).index
+    traced = (e.index for e in belief.exclusions if e.index is not None)
+    return max(belief.first_index, *(i + 1 for i in chain(there, traced)), 0)
 
 
 def _admitted(

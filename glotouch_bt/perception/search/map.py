@@ -22,6 +22,7 @@ from glotouch_bt.perception.search.remaining import (
 )
 from glotouch_bt.perception.search.tracing import TraceParams
 from glotouch_bt.perception.touch import Candidate, Contact, Contour, signed_distance
+from glotouch_bt.perception.touch.outline import occupied
 from glotouch_bt.robot import Array, ParamError, frozen_array
 
 PATH_STEP_M = 0.002
@@ -63,6 +64,11 @@ class Exclusion:
     margin_m: float
     index: int | None = None
 
+    @classmethod
+    def of(cls, contour: Contour, margin_m: float, index: int) -> Exclusion:
+        """Return the exclusion of a traced object; contacts outside the outline widen its margin."""
+        return cls(contour, margin_m + protrusion_m(contour), index)
+
     @property
     def given_margin_m(self) -> float:
         """The margin without what contacts outside the outline add."""
@@ -96,6 +102,7 @@ class SearchMap:
             to be probed.
         probed: Indices of the candidates that were probed for that; each is probed once.
         first_index: Least index of a new candidate; smaller ones may have been given to candidates that were forgotten.
+        to_replace: Candidates that are traced anew, as they were: a new one in the place of one of them gets its index.
     """
 
     half_extent_m: Array
@@ -110,6 +117,7 @@ class SearchMap:
     unprobed: bool = False
     probed: tuple[int, ...] = ()
     first_index: int = 0
+    to_replace: tuple[Candidate, ...] = ()
 
     @classmethod
     def blank(
@@ -176,18 +184,23 @@ class SearchMap:
         if index is None:
             index = max([self.first_index, *(e.index + 1 for e in self.exclusions if e.index is not None)])
         others = self.without_exclusion(index).exclusions
-        return replace(self, exclusions=(*others, Exclusion(contour, margin_m + protrusion_m(contour), index)))
+        return replace(self, exclusions=(*others, Exclusion.of(contour, margin_m, index)))
 
     def without_exclusion(self, index: int) -> SearchMap:
         """Remove a traced object: it is a part of another one."""
         return replace(self, exclusions=tuple(e for e in self.exclusions if e.index != index))
 
     def only_with(self, candidates: Iterable[Candidate]) -> SearchMap:
-        """Remove traced objects that are no candidates: they turned out to be parts of others, or are gone."""
-        kept = {c.index for c in candidates}
-        gone = [e.index for e in self.exclusions if e.index is not None and e.index not in kept]
-        left = tuple(e for e in self.exclusions if e.index is None or e.index in kept)
-        return replace(self, exclusions=left, first_index=max([self.first_index, *(i + 1 for i in gone)]))
+        """Keep the traced objects that are candidates, with the outlines that these have now, and remove the others:
+        they turned out to be parts of others, or are gone. Where an object no longer is may be searched again.
+        """
+        now = {c.index: c for c in candidates}
+        gone = [e.index for e in self.exclusions if e.index is not None and e.index not in now]
+        kept = [e for e in self.exclusions if e.index is None or e.index in now]
+        updated = tuple(
+            e if e.index is None else Exclusion.of(occupied(now[e.index]), e.given_margin_m, e.index) for e in kept
+        )
+        return replace(self, exclusions=updated, first_index=max([self.first_index, *(i + 1 for i in gone)]))
 
     def unsearched(self, outline: Contour, within_m: float) -> SearchMap:
         """Forget the path and the dropped positions within a distance of an outline: something may stand there now."""

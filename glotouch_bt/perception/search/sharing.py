@@ -34,6 +34,9 @@ OVERLAP_SD_M = 0.003
 """Standard deviation of the depth to which the outlines of two bodies seem to overlap. Source: ours."""
 MAX_OVERLAP_NATS = 60.0
 """Log evidence that an overlap costs at most: an outline that is hardly known may be far off. Source: ours."""
+MISFIT_M = 0.005
+"""Root mean square distance, m, of contacts from their outline above which they are not those of one body. Source:
+ours; limbs of a figure lie a few millimetres off its outline."""
 MIN_GAIN_NATS = 3.0
 """Minimum gain of log evidence of a step. Source: ours."""
 NEAR_M = 0.015
@@ -86,10 +89,11 @@ def overlap_depth_m(a: Contour, b: Contour) -> float:
 def contradictions(candidates: Sequence[Candidate]) -> dict[int, str]:
     """Return the index of each candidate whose outline cannot be right, and why.
 
-    Such an outline is still uncertain, or it is the less certain one of two that overlap: bodies do not. Objects that
-    are pushed while they are traced leave such outlines.
+    It is uncertain, it is narrower than any object, its contacts do not fit it, or it is the less certain one of two
+    that overlap: bodies do not. Traces that pass on to a neighbour leave such outlines, and objects that are pushed
+    while they are traced.
     """
-    wrong = {c.index: "its outline is still uncertain" for c in candidates if c.quality < KNOWN_QUALITY}
+    wrong = {c.index: why for c in candidates if (why := _why_wrong(c))}
     for one, other in combinations((c for c in candidates if c.index not in wrong), 2):
         depth_m = overlap_depth_m(one.contour, other.contour)
         if depth_m > OVERLAP_M:
@@ -98,6 +102,17 @@ def contradictions(candidates: Sequence[Candidate]) -> dict[int, str]:
                 worse.index, f"its outline overlaps that of candidate {better.index} by {1e3 * depth_m:.0f} mm"
             )
     return wrong
+
+
+def _why_wrong(candidate: Candidate) -> str:
+    """Return why an outline cannot be right by itself; empty if it may be."""
+    if candidate.quality < KNOWN_QUALITY:
+        return "its outline is still uncertain"
+    if (width_m := min(candidate.contour.size_m)) < MIN_BODY_M:
+        return f"its outline is only {1e3 * width_m:.0f} mm wide"
+    points = np.array([c.point_K_m for c in candidate.contacts])
+    misfit_m = float(np.sqrt(np.mean(signed_distance(candidate.contour, points) ** 2)))
+    return f"its contacts are {1e3 * misfit_m:.0f} mm off its outline" if misfit_m > MISFIT_M else ""
 
 
 def _ids(contacts: tuple[Contact, ...]) -> frozenset[int]:

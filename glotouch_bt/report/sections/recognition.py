@@ -39,8 +39,9 @@ def _by_probability(ranking: dict[str, Any], matches: list[dict[str, Any]], name
     accepted = bool(ranking.get("accepted"))
     matches = sorted(matches, key=lambda m: -(_share(m) or 0.0))
     lead = (
-        f"The probability that each candidate, or none of them, is {target}. The best is accepted only if its "
-        "probability and its evidence are high enough. The terms are in nats; positive values support the target."
+        f"The probability that each candidate, or none of them, is {target}. The best is accepted only if its share of "
+        "the candidates' probabilities reaches the mission's <code>confidence</code>, if none of them is improbable "
+        "enough, and if its evidence is high enough. The terms are in nats; positive values support the target."
     )
     shares = [(f"candidate {esc(m.get('index', '?'))}", _share(m) or 0.0) for m in matches]
     absent = ranking.get("p_absent")

@@ -78,6 +78,20 @@ def test_a_new_candidate_never_takes_the_index_of_a_traced_object(candidate):
     assert admitted.belief.found == 3
 
 
+@pytest.mark.parametrize(("aside_m", "index"), [(0.0, 0), (0.015, 0), (0.2, 1)])
+def test_what_is_traced_anew_keeps_its_index(candidate, aside_m, index):
+    """The candidate to replace is half of the box; the box is traced where it stands, moved, or elsewhere."""
+    belief = dataclasses.replace(SearchMap.blank((0.3, 0.3), expected=2), to_replace=(candidate,), first_index=1)
+    aside = np.array([0.0, aside_m, 0.0])
+    contacts = tuple(
+        dataclasses.replace(c, tip_K_m=c.tip_K_m - aside, point_K_m=c.point_K_m - aside[:2])
+        for c in (*half_a_box(), contact(0.04, 0.0, 1, 0))
+    )
+    traced = OutlineTrace(contacts, outline_of(contacts, R), np.zeros(2), np.zeros((0, 2)))
+    admitted = admit(belief, (), contacts[0], traced, 0.018, 0.01)
+    assert ([c.index for c in admitted.candidates], admitted.index) == ([index], index)
+
+
 def test_what_stands_too_near_for_another_object_is_the_same(candidate):
     """16 mm off the contacts, where no other object can stand (30 mm); 26 mm off one can."""
     two = {}

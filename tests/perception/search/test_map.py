@@ -1,8 +1,10 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
 from glotouch_bt.perception.search import SearchMap
-from glotouch_bt.perception.touch import Contact, Contour
+from glotouch_bt.perception.touch import Candidate, Contact, Contour
 from glotouch_bt.robot import ParamError
 from tests.support.swept_area import covered_fraction
 
@@ -48,6 +50,26 @@ def test_exclusion_is_the_inflated_outline():
     np.testing.assert_array_equal(belief.inside_exclusion(points), [True, True, False, False])
     limbs = Contour("round", DISC.centre_K_m, DISC.size_m, 0.0, 0.003, np.array([0.004, -0.002, 0.0]))
     np.testing.assert_array_equal(blank().with_exclusion(limbs, 0.01).inside_exclusion(points), [1, 1, 1, 0])
+
+
+def test_a_kept_map_has_the_present_outlines():
+    """A coarse outline of 60 mm was refined to 40 mm: beside it, something may be hidden. The other one is gone."""
+    belief = blank().with_exclusion(DISC, 0.01, 3)
+    belief = belief.with_exclusion(dataclasses.replace(DISC, centre_K_m=np.array([-0.1, 0.0])), 0.01, 5)
+    a = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+    out = np.column_stack([np.cos(a), np.sin(a)])
+    contacts = tuple(
+        Contact(0.0, np.array([*(DISC.centre_K_m + 0.026 * n), 0.018]), np.array([*-n, 0.0]), np.array([*n, 0.0]),
+                DISC.centre_K_m + 0.02 * n, 1.0)
+        for n in out
+    )  # fmt: skip
+    refined = Candidate(3, dataclasses.replace(DISC, size_m=(0.04, 0.04)), 0.06, 1.0, contacts)
+    now = belief.only_with((refined,))
+    assert [(e.index, e.given_margin_m) for e in now.exclusions] == [(3, pytest.approx(0.01))]
+    points = np.array([[0.05, 0.0], [0.05, 0.029], [0.05, 0.031], [-0.1, 0.0]])
+    np.testing.assert_array_equal(belief.inside_exclusion(points), [True, True, True, True])
+    np.testing.assert_array_equal(now.inside_exclusion(points), [True, True, False, False])
+    assert now.first_index == 6, "no new candidate gets the index of the one that is gone"
 
 
 def test_covered_fraction_of_one_stripe():

@@ -2,7 +2,7 @@
 
 from glotouch_bt.perception.touch.outline.belief import current_tips, infer_outline
 from glotouch_bt.perception.touch.outline.contours import contour_quality, fit_contour, fit_kind, signed_distance
-from glotouch_bt.perception.touch.outline.envelope import KNOWN_QUALITY, envelope, footprint
+from glotouch_bt.perception.touch.outline.envelope import KNOWN_QUALITY, envelope, footprint, occupied
 from glotouch_bt.perception.touch.outline.mixture import OutlineBelief
 from glotouch_bt.perception.touch.outline.moved import infer_outline_from_contacts, split_at_motion
 from glotouch_bt.perception.touch.outline.polygons import (

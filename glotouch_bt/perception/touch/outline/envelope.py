@@ -1,10 +1,10 @@
-"""Envelope and footprint of a candidate: bounds of its contacts and outline, for search and clearance."""
+"""Bounds of a candidate's contacts and outline, for search and clearance."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from glotouch_bt.perception.touch.outline.polygons import convex_hull, minimum_rectangle
+from glotouch_bt.perception.touch.outline.polygons import area_and_centroid, convex_hull, minimum_rectangle
 from glotouch_bt.perception.touch.values import Candidate, Contour
 from glotouch_bt.robot import Array, ParamError
 
@@ -53,6 +53,21 @@ def footprint(candidate: Candidate, *, presumed: bool = True) -> Array:
     met = np.array([c.point_K_m for c in candidate.contacts])
     corners = CONTACT_M * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
     return convex_hull((met[:, None] + corners).reshape(-1, 2))
+
+
+def occupied(candidate: Candidate) -> Contour:
+    """Return where certainly nothing else stands: the envelope, or only the hull of the contacts if the quality is
+    below `KNOWN_QUALITY`. A search then also looks where such a candidate is only presumed.
+    """
+    if candidate.quality >= KNOWN_QUALITY:
+        return envelope(candidate)
+    try:
+        hull = convex_hull(np.array([c.point_K_m for c in candidate.contacts]))
+    except ParamError:
+        return envelope(candidate)
+    size, yaw = minimum_rectangle(hull)[1:]
+    middle = area_and_centroid(hull)[1]
+    return Contour("box", middle, (size[0], size[1]), yaw, 0.0, np.zeros(0), family="free", boundary_K_m=hull)
 
 
 def _circle(points: Array, centre: Array) -> Contour:

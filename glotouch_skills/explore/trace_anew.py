@@ -1,4 +1,4 @@
-"""Forget outlines that cannot be right, so that the search finds these objects again."""
+"""Choose outlines that cannot be right, so that the search traces them anew."""
 
 from __future__ import annotations
 
@@ -11,32 +11,34 @@ from glotouch_bt.robot import HOLD
 from glotouch_bt.skill import Failure, In, Out, Skill, SkillParams, SkillRun, param
 
 AROUND_M = 0.02
-"""Distance around a forgotten outline within which the floor is searched again. Source: ours; objects that are traced
+"""Distance around such an outline within which the floor is searched again. Source: ours; objects that are traced
 move by up to 20 mm."""
-
 MISSING = "fewer objects are known than expected"
 """Why the search goes on without a wrong outline."""
 
 
-class ForgetUncertainParams(SkillParams):
-    """Parameters of `forget_uncertain`."""
+class TraceAnewParams(SkillParams):
+    """Parameters of `trace_anew`."""
 
     times: int = param("Largest number of times that the search goes on", default=2, ge=0, le=20)
 
 
-class ForgetUncertain(Skill):
-    """Forget the outlines that are still uncertain after they were refined, or overlap others.
+class TraceAnew(Skill):
+    """Choose the outlines that cannot be right although they were refined, so that the search traces them anew.
 
-    An object that is pushed while it is traced leaves such an outline: its contacts are from several places. Further
-    contacts do not mend it. The search goes back to where it was touched, and traces it with new contacts only. It goes
-    on, too, if fewer candidates are left than objects are expected: two of them turned out to be one body.
+    Such an outline is uncertain, too narrow for an object, overlaps another one, or does not fit its contacts. A trace
+    that passes on to a neighbour leaves it, and so does an object that is pushed while it is traced: further contacts
+    do not mend it. The search goes back to where it was touched, and traces it with new contacts only. Until then,
+    record and report show it as it was, and the new outline gets its index. The search goes on, too, if fewer
+    candidates are left than objects are expected: two of them turned out to be one body. With as many candidates as
+    objects, it does not.
 
     SUCCESS: `candidates` and `map` have no such outline. `search_done` is true if there was none and no object is
     missing, or if the search went on often enough.
     """
 
-    Params = ForgetUncertainParams
-    params: ForgetUncertainParams
+    Params = TraceAnewParams
+    params: TraceAnewParams
 
     NOTHING_SEARCHED = Failure("nothing_searched", "there is no map yet", advice="sweep first, with guarded_sweep")
 
@@ -56,9 +58,9 @@ class ForgetUncertain(Skill):
         if self.before is None:
             raise self.NOTHING_SEARCHED("there is no map yet")
         known, probed, rows = self.known or (), self.before_probed or (), self.before_retraced or ()
+        belief = self._without_lost(self.before.only_with(known), known)
         refined = {t.candidate for t in probed if t.part == "outline"}
         wrong = contradictions([c for c in known if c.index in refined])
-        belief = self.before.only_with(known)
         missing = belief.expected is not None and belief.found < belief.expected
         times = len({row[0] for row in rows})
         self.search_done = not (wrong or missing) or times >= self.params.times
@@ -68,20 +70,25 @@ class ForgetUncertain(Skill):
         gone = tuple(c for c in known if c.index in wrong)
         self.candidates = tuple(c for c in known if c.index not in wrong)
         self.probed = tuple(t for t in probed if t.candidate not in wrong)
-        belief = belief.only_with(self.candidates)
+        belief = replace(belief.only_with(self.candidates), to_replace=gone)
         for candidate in gone:
             belief = belief.unsearched(candidate.contour, AROUND_M)
             belief = belief.with_hints((*belief.hints, *reversed(candidate.contacts)))
             self.context.arm.felt.forget_free_near(candidate.contour.centre_K_m)
-            self.event("forgotten", why=wrong[candidate.index], candidates=(candidate.index,))
-        if belief.expected is not None:
-            belief = replace(belief, expected=max(belief.expected, len(known)))
+            self.event("note", text=f"candidate {candidate.index} is traced anew: {wrong[candidate.index]}")
         self.map = belief
         reasons = [(str(i), why) for i, why in wrong.items()] or [("-", MISSING)]
         self.retraced = (*rows, *((str(times + 1), *reason) for reason in reasons))
         self.report(
             "Traced anew",
-            "What cannot be right was forgotten, and the search went on.",
-            ("round", "forgotten candidate", "why"),
+            "These outlines could not be right, so the search went on with new contacts only.",
+            ("round", "candidate", "why"),
             self.retraced,
         )
+
+    def _without_lost(self, belief: SearchMap, known: tuple[Candidate, ...]) -> SearchMap:
+        """Return the map without candidates to be traced anew; record those that were not found again."""
+        there = {c.index for c in known}
+        if lost := [c.index for c in belief.to_replace if c.index not in there]:
+            self.event("forgotten", why="nothing was found there when it was to be traced anew", candidates=lost)
+        return replace(belief, to_replace=())
