@@ -24,9 +24,9 @@ class StartOverParams(SkillParams):
 class StartOver(Skill):
     """Forget map, candidates and touches, if they cannot all be right.
 
-    They cannot if two outlines overlap, because bodies do not, if contacts do not fit their outline, or if an outline
-    is still uncertain. Objects that are pushed while they are traced leave such maps, and tracing some of them again
-    does not mend them.
+    They cannot if two outlines overlap, because bodies do not, if an outline is narrower than any object or still
+    uncertain, or if contacts do not fit their outline. Objects that are pushed while they are traced leave such maps,
+    and tracing some of them again does not mend them.
 
     SUCCESS: everything is forgotten. New candidates get new indices.
     """

@@ -28,10 +28,10 @@ class TraceAnew(Skill):
 
     Such an outline is uncertain, too narrow for an object, overlaps another one, or does not fit its contacts. A trace
     that passes on to a neighbour leaves it, and so does an object that is pushed while it is traced: further contacts
-    do not mend it. The search goes back to where it was touched, and traces it with new contacts only. Until then,
-    record and report show it as it was, and the new outline gets its index. The search goes on, too, if fewer
-    candidates are left than objects are expected: two of them turned out to be one body. With as many candidates as
-    objects, it does not.
+    do not mend it. The search goes back to where it was touched, and traces it with new contacts only. Until then, it
+    is not among `candidates`, but record and report still show it. The new outline gets its index. The search goes on,
+    too, if fewer candidates are left than objects are expected: two of them turned out to be one body. With as many
+    candidates as objects, it does not.
 
     SUCCESS: `candidates` and `map` have no such outline. `search_done` is true if there was none and no object is
     missing, or if the search went on often enough.

@@ -125,8 +125,9 @@ def scene(mission: str, objects: Path | None, world: str | None = None) -> tuple
 def score_run(record: RunRecord, sections: dict[str, FeltSection]) -> dict[str, Any]:
     """Score the discoveries of a recorded run against its truth.
 
-    A candidate that was forgotten counts as never found; one that is traced anew keeps its index. `contact_gap_mm` are
-    the distances of the ball from the true probe section where sweeps stopped.
+    A candidate that was forgotten counts as never found. One that is being traced anew counts as found meanwhile, if
+    the new outline, which has its index, is right, too. `contact_gap_mm` are the distances of the ball from the true
+    probe section where sweeps stopped.
 
     Raises:
         BadInput: The record has no truth beside it.
